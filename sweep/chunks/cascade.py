@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -99,7 +99,6 @@ class Batch:
         )
 
 
-@dataclass
 class Cascade:
     """The levels of a study with the designs that wait at each of them.
 
@@ -112,22 +111,15 @@ class Cascade:
     should_stop : called before every batch; if it returns true, `Dropped` is raised
     """
 
-    study: Study
-    keep: bool = True
-    should_stop: Callable[[], bool] = lambda: False
-    levels: tuple[Level, ...] = field(init=False)
-    reached: list[int] = field(init=False)
-    counts: NDArray[np.int64] = field(init=False)
-    missed: Counter[str] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.levels = levels(self.study)
-        self._waiting: list[list[Batch]] = [[] for _ in self.levels]
-        self._left: list[Batch] = []
-        self._go_on = GOES_ON if self.study.output.keep == "all" else np.arange(256) == codes.OK
+    def __init__(self, study: Study, keep: bool = True, should_stop: Callable[[], bool] = lambda: False) -> None:
+        self.study, self.keep, self.should_stop = study, keep, should_stop
+        self.levels = levels(study)
         self.reached = [0] * len(self.levels)
         self.counts = np.zeros(256, np.int64)
-        self.missed = Counter()
+        self.missed = Counter[str]()
+        self._waiting: list[list[Batch]] = [[] for _ in self.levels]
+        self._left: list[Batch] = []
+        self._go_on = GOES_ON if study.output.keep == "all" else np.arange(256) == codes.OK
 
     def feed(self, index: NDArray[np.int64], designs: Array, status: NDArray[np.uint8]) -> None:
         """Feed designs with all parameters (k, P), or with the leading columns that the first level needs.
@@ -242,16 +234,18 @@ class Cascade:
             self._left.append(self._completed(batch if leaves.all() else batch.only(np.flatnonzero(leaves))))
 
 
-@dataclass
 class Recalled(Cascade):
     """Cascade for designs whose outputs are known from an earlier run with other limits.
 
     Parameters
     ----------
+    study, keep, should_stop : as for `Cascade`
     known : column ``design``, ascending, and every output and error estimate of these designs, in float64
     """
 
-    known: Columns = field(default_factory=dict)
+    def __init__(self, study: Study, keep: bool, should_stop: Callable[[], bool], known: Columns) -> None:
+        super().__init__(study, keep, should_stop)
+        self.known = known
 
     def _found(self, level: Level, batch: Batch) -> Mapping[str, NDArray[Any]]:
         rows = np.searchsorted(self.known["design"], batch.index)

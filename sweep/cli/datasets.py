@@ -9,7 +9,7 @@ import click
 
 from sweep.cli.options import FOLDER, IS_FOLDER, OUT, SMOKE, STUDY
 from sweep.dataset.comparison import compare as compare_datasets
-from sweep.dataset.files import DESIGNS
+from sweep.dataset.files import results_folder
 from sweep.dataset.verification import INCOMPLETE
 from sweep.dataset.verification import verify as verify_dataset
 from sweep.engine.parts import merge as merge_parts
@@ -96,6 +96,4 @@ def merge(study: Path, out: Path | None, smoke: bool) -> None:
 
 def _folder(study: Path, out: Path | None, smoke: bool) -> Path:
     """Return the folder that `sweep run` uses."""
-    if out is not None:
-        return out
-    return Path("results", *(["smoke"] if smoke else []), load_study(study, smoke=smoke).name, DESIGNS)
+    return out or results_folder(load_study(study, smoke=smoke).name, smoke)

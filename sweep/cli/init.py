@@ -84,10 +84,10 @@ def init(
     machine = _machine(members)
     folder = into / name
     shared = _shared_schema(into)
-    seen = _seen_from(folder, shared)
+    schema = SCHEMA if shared is None else Path(os.path.relpath(shared, folder.resolve())).as_posix()
     mechanism = machine or find_family(family_names(family or ""))
     design = None if points is None or family is None else drawn(family, points, unit=unit).parameters
-    files = {"study.toml": study_text(name, mechanism, seen, design), "smoke.toml": smoke_text(mechanism)}
+    files = {"study.toml": study_text(name, mechanism, schema, design), "smoke.toml": smoke_text(mechanism)}
     if shared is None:
         files[SCHEMA] = schema_text()
     _write(folder, files)
@@ -136,7 +136,3 @@ def _shared_schema(into: Path) -> Path | None:
     """Return the schema that a project keeps for all its studies, docs/study.schema.json, if ``into`` lies in one."""
     here = into.resolve()
     return next((file for up in (here, *here.parents) if (file := up / "docs" / SCHEMA).is_file()), None)
-
-
-def _seen_from(folder: Path, schema: Path | None) -> str:
-    return SCHEMA if schema is None else Path(os.path.relpath(schema, folder.resolve())).as_posix()

@@ -48,6 +48,11 @@ PLAN_TYPES: Mapping[str, type] = {
 }  # fmt: skip
 
 
+def results_folder(name: str, smoke: bool) -> Path:
+    """Folder of the designs of a study for which no other is named."""
+    return Path("results", *(["smoke"] if smoke else []), name, DESIGNS)
+
+
 def located(folder: str | Path) -> Path:
     """Folder of designs: the given folder, or the ``designs`` folder inside if the given one has no chunks."""
     place = Path(folder)

@@ -161,8 +161,7 @@ def run(
         with Phases(progress) as phases:
             _compile(model, jobs, phases)
             chunk_size = None if force else _within_budget(model, jobs, lambda k, of: phases.say("planning", k, of))
-        default = Path("results", *(["smoke"] if smoke else []), model.name, files.DESIGNS)
-        folder = default if out is None else files.located(out)
+        folder = files.results_folder(model.name, smoke) if out is None else files.located(out)
         said = command(model, folder, smoke, accuracy, certify)
         with locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
             computed = _sweep(model, folder, jobs, place, force, chunk_size, progress)

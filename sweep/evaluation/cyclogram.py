@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,7 +68,7 @@ def cyclogram(
 
     family = find_family(mechanism)
     designs = one_design(family, in_radians(family, design, angles))
-    if not 0.0 < dwell < 0.5:
+    if not isinstance(dwell, Real) or not 0.0 < dwell < 0.5:
         raise InputError("dwell", dwell, "a share of the stroke between 0 and 0.5", "cyclogram")
     poses = Poses(family, family.precise(), designs)
     rows = [row for member, name in _positions(family) for row in _strokes(poses, family, member, name, dwell)]

@@ -143,7 +143,7 @@ def rod(body: str, material: str, section: str, inertia: str = "slender") -> dic
         sizes = [factor(match[3], "mm") * float(size) for size in match.groups()[:2] if size is not None]
         area, squared_radius = _AREAS[match[4]](*sizes), _GYRATIONS.get(match[4])
         squared = math.nan if squared_radius is None else squared_radius(*sizes)
-    except (AssertionError, TypeError, ValueError):
+    except (AssertionError, AttributeError, TypeError, ValueError):
         raise InputError("section", section, f"a section, as {SECTIONS}", body) from None
     if not area > 0.0:
         raise InputError("section", section, "positive sizes, a wall of at most half the diameter", body)

@@ -164,8 +164,8 @@ def export(
     kind = _format(target, format)
     if unit not in METRES:
         raise InputError("unit", unit, "mm or m", "export")
-    if not 3 <= poses <= MOST_POSES:
-        raise InputError("poses", poses, f"at least 3, at most {MOST_POSES}", "export")
+    if not isinstance(poses, int | np.integer) or not 3 <= poses <= MOST_POSES:
+        raise InputError("poses", poses, f"a whole number, at least 3, at most {MOST_POSES}", "export")
     speed = speed_given(speed)
     if speed is not None and not (math.isfinite(speed) and speed > 0.0):
         raise InputError("speed", speed, "a positive number of rad/s", "export")

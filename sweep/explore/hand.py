@@ -13,7 +13,7 @@ from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.errors import InputError, nearest
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Array, Family, Parameter
+from sweep.families.base import Family, Parameter
 from sweep.families.names import is_flag
 from sweep.optimise.starts.dataset import random_designs
 from sweep.report.dataset import Dataset, Row, chosen, read_dataset, reference_of, row_of, without_rows
@@ -159,13 +159,13 @@ class Hand:
             low, high = swept[p.name]
             entries[p.name] = {"from": low, "to": high, "unit": PARAMETER_UNITS[p.unit]}
             entries[p.name] |= {"count": COUNT} if len(axes) <= 2 else {}
-        old, mechanism_names = self.study.data, self.own
+        old, mechanism_names, curves = self.study.data, self.own, self.study.curves
         if not axes and "optimise" in old:
             raise InputError("dimensions", "none", STEADY, "explore")
         data: dict[str, Any] = {name: table for name, table in old.items() if name not in TABLES}
         for table in ("bodies", "loads", "design"):
             rest = {name: entry for name, entry in old.get(table, {}).items() if name != "sample"}
-            data |= {table: {name: self._entry(entries, name, entry) for name, entry in rest.items()}} if rest else {}
+            data |= {table: {n: x if n in curves else entries.get(n, x) for n, x in rest.items()}} if rest else {}
         data["design"] = {name: entries[name] for name in mechanism_names} | data["design"]
         if len(axes) > 2:
             data["design"]["sample"] = {"kind": "sobol", "n": SAMPLE}
@@ -175,9 +175,6 @@ class Hand:
         data |= {"optimise": {"starts": STARTS}} if "optimise" in old else {}
         study_from_data(data, "study.toml")
         return toml(data)
-
-    def _entry(self, entries: Mapping[str, Any], name: str, entry: Any) -> Any:
-        return entry if name in self.study.curves else entries.get(name, entry)
 
     def reference(self, given: Mapping[str, object]) -> str:
         """Return the table [reference.design] of a study."""
@@ -207,12 +204,8 @@ def of_study(study: Study) -> Hand:
             allowed = "one with a design that [locus] and [fit] can make"
             raise InputError("design space", space.count, allowed, "explore")
         return Hand(without_rows(study), None, dict(zip(names, designs[0].tolist(), strict=True)), {})
-    middle = {axis.name: _middle(axis.values, axis.low, axis.high) for axis in space.axes}
+    middle = {x.name: 0.5 * (x.low + x.high) if x.values is None else float(x.values[x.count // 2]) for x in space.axes}
     return Hand(without_rows(study), None, {name: {**space.fixed, **middle}[name] for name in names}, {})
-
-
-def _middle(values: Array | None, low: float, high: float) -> float:
-    return 0.5 * (low + high) if values is None else float(values[len(values) // 2])
 
 
 def of_results(folder: Path) -> Hand:

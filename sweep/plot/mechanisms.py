@@ -142,12 +142,12 @@ def motion(
         raise InputError("axes", len(panels), f"{len(names)}, one for each of {', '.join(names)}", "plot")
     labels = [str(name) if isinstance(name, str) else f"design {name}" for name in index]
     with house_style():
-        return _panels(family, names, dict(zip(labels, (turn for _, turn in poses.groupby("design")), strict=True)),
-                       unit, speed_given(speed), panels)  # fmt: skip
+        turns = list(zip(labels, (turn for _, turn in poses.groupby("design")), strict=True))
+        return _panels(family, names, turns, unit, speed_given(speed), panels)
 
 
 def _panels(
-    family: Family, names: list[str], turns: Mapping[str, pd.DataFrame], unit: str, speed: float | None,
+    family: Family, names: list[str], turns: Sequence[tuple[str, pd.DataFrame]], unit: str, speed: float | None,
     panels: list[Any] | None,
 ) -> NDArray[Any]:  # fmt: skip
     """Draw curves over the crank angle from the lowest position, so that several designs can be compared."""
@@ -157,10 +157,10 @@ def _panels(
         for axes in every[len(names) :]:
             axes.set_axis_off()
         panels = every[: len(names)]
-    free = any(lowest(family.position, turn[family.position].to_numpy(float))[1] for turn in turns.values())
+    free = any(lowest(family.position, turn[family.position].to_numpy(float))[1] for _, turn in turns)
     for axes, name in zip(panels, names, strict=True):
         shown = quantity(name, family.pose_output[name].unit.replace("length", unit))
-        for (design, turn), colour in zip(turns.items(), cycle(COLOURS)):
+        for (design, turn), colour in zip(turns, cycle(COLOURS)):
             angle, values = aligned_turn(turn, name, family.position)
             look = {"color": REFERENCE, "linestyle": "--"} if design == "reference" else {"color": colour}
             axes.plot(np.degrees(angle), values * shown.factor, label=design, zorder=3, **look)

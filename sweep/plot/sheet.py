@@ -35,6 +35,7 @@ POSES = 180  # poses of the joints' paths
 WORDS = {"xy": "front", "zy": "side, from the left", "xz": "top"}
 LETTERS, PAD, LEAST = 23.0, 1.0, 12.0  # letters per inch, in a cell's margin, in the last column
 DIGITS = 6  # significant digits of coordinates: a micrometre in half a metre
+ZERO = 1e-9  # mm: smaller coordinates are rounding of zero
 ENDINGS = (".pdf", ".svg", ".dxf")
 
 
@@ -99,7 +100,10 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
         (lines if row.name in mechanism_names else others).append(line)
     heads = ("name", "value", "tolerance", "")
     joints = tuple(
-        (_joint(part, name), *(number(_zero(x), DIGITS) for x in path[0].tolist()))
+        (
+            " ".join(filter(None, [part.member, f"{shown_name(name)}{part.stage}"])),
+            *(number(0.0 if abs(x) < ZERO else x, DIGITS) for x in path[0].tolist()),
+        )
         for part in parts
         for name, path in part.joints.items()
     )
@@ -124,14 +128,6 @@ def _cyclogram(data: Dataset) -> list[Table]:
         for member, kind, name, start, end, _ in events
     ]
     return [Table("Cyclogram, by the angle of the main shaft", ("what", "", "from", "to"), tuple(lines))]
-
-
-def _joint(part: Part, name: str) -> str:
-    return " ".join(filter(None, [part.member, f"{shown_name(name)}{part.stage}"]))
-
-
-def _zero(x: float) -> float:
-    return 0.0 if abs(x) < 1e-9 else x  # mm: rounding of zero
 
 
 def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target: Path) -> None:

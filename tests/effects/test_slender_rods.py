@@ -71,6 +71,8 @@ def test_a_wall_of_more_than_half_the_diameter_is_refused():
     assert sweep.rod("crank", "steel", "6 x 3 mm tube")["line_mass_crank"] == pytest.approx(solid, rel=1e-15)
     with pytest.raises(sweep.InputError, match="at most half the diameter"):
         sweep.rod("crank", "steel", "6 x 4 mm tube")
+    with pytest.raises(sweep.InputError, match="section = 6; allowed: a section"):
+        sweep.rod("crank", "steel", 6)
 
 
 def test_an_explicit_zero_is_a_mass_in_its_pivot():

@@ -18,6 +18,12 @@ from tests.families.machines.test_hand_made_stitches import DESIGN, PHI, machine
 CRANK, ROD = 20.0, 70.0
 
 
+@pytest.mark.parametrize("dwell", [0.0, 0.5, math.nan, None])
+def test_a_dwell_that_is_no_share_of_the_stroke_is_refused(dwell):
+    with pytest.raises(sweep.InputError, match="a share of the stroke between 0 and 0"):
+        sweep.cyclogram("slider_crank", {"a": CRANK, "b": ROD, "e": 0.0}, dwell=dwell)
+
+
 def test_strokes_and_dwells_of_a_slider_crank_are_those_of_its_closed_form():
     rows = sweep.cyclogram("slider_crank", {"a": CRANK, "b": ROD, "e": 0.0}, dwell=0.05)
     strokes = rows[rows["kind"] == "stroke"].set_index("name")

@@ -72,6 +72,8 @@ def test_motion_of_several_designs_in_axes_of_ones_own():
     found = sweep.evaluate("rssr", table.iloc[[1]], "dpsi", phi=phi)["dpsi"]
     assert own[0].lines[1].get_ydata().max() == pytest.approx(found.max(), abs=1e-12)
     assert [text.get_text() for text in own[0].get_legend().get_texts()] == ["long", "short"]
+    alike = sweep.plot.motion("rssr", table.set_axis(["same", "same"]), "dpsi")
+    assert len(alike[0].lines) == 2  # designs of one name are drawn too
     with pytest.raises(sweep.InputError, match="axes = 2; allowed: 1"):
         sweep.plot.motion("rssr", table, "dpsi", axes=own)
     assert [line.get_label() for line in sweep.plot.motion("rssr", RSSR | {"a": [1.0, 1.1]})[0].lines] == [
