@@ -57,6 +57,9 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
     file = Path(path)
     file = file / "study.toml" if file.is_dir() else file
     beside = file.with_name("smoke.toml")
+    if smoke and not beside.exists():
+        needed = "a file beside study.toml with the keys that its tiny version changes, docs/study-files.md"
+        raise StudyError(str(beside), [f"smoke.toml is missing; needed: {needed}"])
     files = [file, beside] if smoke else [file]
     read = {f.name: read_toml(f) for f in files}
     places = {f.name: key_lines(toml_text(f)) for f in files}

@@ -56,7 +56,7 @@ def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match=r"study\.toml: cannot be read: No such file"):
         load_study(tmp_path)
     (tmp_path / "study.toml").write_text(RIGHT)
-    with pytest.raises(StudyError, match=r"smoke\.toml: cannot be read: No such file"):
+    with pytest.raises(StudyError, match=r"smoke\.toml is missing; needed: a file beside study.toml with the keys"):
         load_study(tmp_path, smoke=True)
 
 
