@@ -124,6 +124,9 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
     }
 
 
+WITHOUT_UNIT = ("count", "scale")  # keys of a parameter that its unit does not belong to
+
+
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Describe keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
     lines = list(_lines(old, new, ""))
@@ -142,8 +145,9 @@ def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[s
         if isinstance(before, Mapping) and isinstance(now, Mapping):
             lines += _lines(before, now, f"{name}.")
         else:
-            unit_before = units[0] if units[0] != units[1] else None
-            lines.append(f"{name} {_written(before, unit_before)} -> {_written(now, units[1])}")
+            unit_before, unit = (None, None) if key in WITHOUT_UNIT else units
+            unit_before = unit_before if unit_before != unit else None
+            lines.append(f"{name} {_written(before, unit_before)} -> {_written(now, unit)}")
     if not lines and units[0] != units[1]:
         lines.append(f"{place}unit {_written(units[0])} -> {_written(units[1])}")
     return lines
@@ -153,9 +157,9 @@ def _written(value: Any, unit: Any = None) -> str:
     if value is None:
         return "none"
     if isinstance(value, Mapping):
-        value, unit = (
-            ", ".join(f"{key} = {_written(v)}" for key, v in value.items() if key != "unit"),
-            value.get("unit"),
+        own, unit = value.get("unit"), None
+        value = ", ".join(
+            f"{key} = {_written(v, None if key in WITHOUT_UNIT else own)}" for key, v in value.items() if key != "unit"
         )
     if isinstance(value, list):
         value = f"{len(value)} values" if len(value) > MOST else ", ".join(map(str, value))
