@@ -82,7 +82,9 @@ class Verification:
         words += [f"{how_many(self.recomputed, 'design')} computed again"] if self.recomputed else []
         damaged = sum(finding.damage for finding in self.findings)
         verdict = (
-            f"{damaged} damaged, {len(self.findings) - damaged} missing" if self.findings else "complete and undamaged"
+            f"{damaged} damaged or lost, {len(self.findings) - damaged} not computed yet"
+            if self.findings
+            else "complete and undamaged"
         )
         words += [*self.notes, *map(str, self.findings), f"{self.folder}: {verdict}"]
         # File names may contain any bytes; undecodable ones are written as escapes.

@@ -131,9 +131,9 @@ class _Night:
         message = "the night was interrupted"
         at_work, after = StudyRecord("cut", code, message=message), StudyRecord("waiting", code, message=message)
         self.written({**records, **{name: after if k else at_work for k, name in enumerate(left)}}, code)
-        kept = ", ".join(records) or "no study"
+        kept = f"{', '.join(records)} kept" if records else "no study complete"
         where = left[0] if left else "its end"
-        words = f"interrupted at {where}: {kept} kept, with all finished chunks; the next night goes on"
+        words = f"interrupted at {where}: {kept}; finished chunks are kept, and the next night goes on"
         self.journal.note("interrupted", words, exit_code=code)
         write_page(self.settings.into)
 

@@ -196,7 +196,7 @@ def test_the_command_line_says_the_verdict_and_ends_with_its_code(dataset: Path,
     chunk(dataset, 0).write_bytes(b"")
     result = CliRunner().invoke(main, ["verify", str(dataset.parent)])
     assert result.exit_code == DAMAGED
-    assert "1 damaged, 0 missing" in result.output
+    assert "1 damaged or lost, 0 not computed yet" in result.output
     # The folder of a study, and the one that holds results, are no datasets.
     (tmp_path / "press").mkdir()
     for folder in (tmp_path / "press", dataset.parent.parent):
