@@ -44,12 +44,6 @@ def eyelet_place(a: Any, f: Any, alpha: Any, angle: Any) -> tuple[Any, Any, Any]
     return tuple(f * u[k] + a * ((mp.cos(angle) if k == 0 else 0) + mp.sin(angle) * across[k]) for k in range(3))
 
 
-def cam_point(a: Any, y: Any, phi: Any) -> tuple[Any, Any, Any]:
-    """Point of the edge x = a y^2 of a plate turned by phi, in fixed axes."""
-    x = a * y**2
-    return x * mp.cos(phi) - y * mp.sin(phi), x * mp.sin(phi) + y * mp.cos(phi), mp.mpf(0)
-
-
 def shortest_over_edge(a: float, phi: float, n1: Any, n2: Any) -> tuple[float, Any, int]:
     """y, length and number of minima over the edge, by a scan of 4000 points and golden sections; float64 first."""
 
