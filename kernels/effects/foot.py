@@ -16,7 +16,7 @@ from kernels.types import TWO_PI, Array
 
 PLATE, RACK, FLIGHT = 0, 1, 2
 _PARTS = 4
-_MOST_EVENTS = 64
+_MOST_EVENTS = 2048  # bounces die out in a few cells, with a restitution of 0.99 too
 _MOST_STEPS = 100
 
 # Outputs of a march, of its last turn, in order.
@@ -233,33 +233,7 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
 
 
 @inline
-def _above(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> tuple[float, float]:
-    """Crank angle and feed between two shares of a cell during which the rack is above the plate."""
-    one, two = rack_height(path, j, low)[0], rack_height(path, j, high)[0]
-    if one <= 0.0 and two <= 0.0:
-        return 0.0, 0.0
-    if one < 0.0 < two:
-        low = _root(path, foot, state, j, low, high, 0)
-    elif two < 0.0 < one:
-        high = _root(path, foot, state, j, low, high, 0)
-    return (high - low) * (TWO_PI / path.shape[1]), _along(path, j, high) - _along(path, j, low)
-
-
-@kernel
-def edge_force(path: Array, foot: Foot, j: int, forces: Array) -> float:
-    """Force over m omega^2 on a foot that follows the rack where the rack passes the plate in cell j, else 0; (5).
-
-    The foot follows if it bears a force at the node where the rack is above the plate.
-    """
-    k = (j + 1) % path.shape[1]
-    if (path[0, j] > 0.0) == (path[0, k] > 0.0) or forces[j if path[0, j] > 0.0 else k] == 0.0:
-        return 0.0
-    s = _root(path, foot, State(PLATE, 0.0, 0.0, 0.0, 0.0), j, 0.0, 1.0, 0)
-    return held(foot, 0.0, rack_height(path, j, s)[2])
-
-
-@inline
-def written(outputs: Array, i: int, tally: Array, foot: Array, most: float, settled: bool) -> None:
+def written(outputs: Array, i: int, tally: Array, foot: Array, settled: bool) -> None:
     """Write the outputs of a foot from the sums of its last turn, in the order of :data:`OUTPUTS`."""
     mass, speed, restitution, rigid = foot[0], foot[3], foot[4], foot[5] == 0.0 and foot[6] == 0.0
     unit = mass * speed * speed
@@ -268,7 +242,7 @@ def written(outputs: Array, i: int, tally: Array, foot: Array, most: float, sett
     outputs[6, i] = tally[6] * speed
     outputs[7, i] = mass * (1.0 + restitution) * tally[6] * speed if rigid else 0.0
     outputs[8, i] = unit * tally[8] if tally[8] < math.inf else math.nan
-    outputs[9, i], outputs[10, i] = most, 1.0 if settled else 0.0
+    outputs[9, i], outputs[10, i] = unit * tally[7], 1.0 if settled else 0.0
 
 
 @inline
@@ -280,14 +254,31 @@ def note(tally: Array, phi: float, mode: int) -> None:
         tally[k], tally[k + 1] = phi, mode
 
 
-@inline
+@kernel
 def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> None:
-    """Add a piece of a cell to the sums of the turn: feed, and the crank angle and feed lost in flight."""
-    angle, way = _above(path, foot, state, j, low, high)
+    """Add a piece of a cell to the sums of the turn: forces, feed, and the crank angle and feed lost in flight."""
+    if state.mode == PLATE:
+        tally[7] = max(tally[7], foot.g0)
+    one, two = rack_height(path, j, low)[0], rack_height(path, j, high)[0]
+    if one <= 0.0 and two <= 0.0:
+        return
+    if one < 0.0 < two:
+        low = _root(path, foot, state, j, low, high, 0)
+    elif two < 0.0 < one:
+        high = _root(path, foot, state, j, low, high, 0)
+    way = _along(path, j, high) - _along(path, j, low)
     tally[5] += way
     if state.mode == FLIGHT:
-        tally[3] += angle
+        tally[3] += (high - low) * (TWO_PI / path.shape[1])
         tally[4] += way
+    # Force on a foot that follows the rack: at both ends of the piece, and where a parabola has its extremum.
+    first, last = _measure(path, foot, state, j, low, 1), _measure(path, foot, state, j, high, 1)
+    middle, rise = _measure(path, foot, state, j, 0.5 * (low + high), 1), last - first
+    bend = first - 2.0 * middle + last
+    top = middle - rise * rise / (8.0 * bend) if abs(rise) < 2.0 * abs(bend) else middle
+    tally[8] = min(tally[8], first, last, top)
+    if state.mode == RACK:
+        tally[7] = max(tally[7], first, last, top)
 
 
 @kernel

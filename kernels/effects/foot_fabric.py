@@ -21,7 +21,6 @@ from kernels.effects.foot import (
     State,
     apart,
     checked,
-    edge_force,
     extremes,
     flown,
     held,
@@ -334,17 +333,11 @@ def march(
             continue
         tally[2] = _landed(rack, foot, fabric, state, turns * count + lowest, parts, work, tally)
         settled = first.mode == state.mode and state.mode == (PLATE if rigid else LYING)
-        most = unit * tally[7]
-        if rigid:
-            for j in range(count):
-                if rack[0, j] > 0.0:
-                    tally[8] = min(tally[8], held(foot, rack[0, j], rack[2, j]))
-                most = max(most, forces[i, j], unit * edge_force(rack, foot, j, forces[i]))
-        else:
+        if not rigid:
             # A foot that lies on its fabric may still rise and sink.  Turns are alike once its state comes back.
             # The changes of the state shrink like a geometric series; their sum is the difference of all later turns.
             moved, size = apart(state, first, spring), max(-rest, highest)
             left = moved / (1.0 - moved / before) if moved < before < math.inf else math.inf
             settled = settled and (moved <= ROUNDING * size or left <= ALIKE * size)
-        written(outputs, i, tally, feet[i], most, settled)
+        written(outputs, i, tally, feet[i], settled)
         changes[i, :] = tally[9:]

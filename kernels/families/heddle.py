@@ -69,6 +69,12 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 
 
 @inline
+def _alike(one: float, other: float) -> bool:
+    """Whether two lengths are equal but for rounding: else it would turn a parallelogram at its dead points."""
+    return abs(one - other) <= 8.0 * EPS * abs(one)
+
+
+@inline
 def reduce_design(designs: Array, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for zero or negative lengths and for numbers that are not finite."""
     unit, per_unit = unit_near(designs[i, 1])
@@ -82,7 +88,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     )
     heddle, slide = designs[i, 10] * per_unit, designs[i, 11] * per_unit
     side_f, side_c = designs[i, 12].real, designs[i, 13].real
-    parallel = designs[i, 6] == designs[i, 7] and designs[i, 8] == designs[i, 9]
+    parallel = _alike(designs[i, 6].real, designs[i, 7].real) and _alike(designs[i, 8].real, designs[i, 9].real)
     first = four_bar(a, b, c, e, side_c)
     # A parallelogram is not solved; unit lengths keep its constants finite.
     one = 1.0 + 0.0 * a

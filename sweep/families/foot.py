@@ -76,8 +76,8 @@ EVENT_OUTPUTS = (
     Output("stitch_error", "1", "lost_travel over the way of the rack above the plate", "(11)"),
     Output("impact_speed", "length/time", "greatest relative speed of an impact in a turn", "(7)"),
     Output("impulse", "N*s", "greatest impulse of an impact in a turn", "(9)"),
-    Output("least_force", "N", "least contact force above the plate, if the foot follows the rack; (5) at the nodes; "
-           "on fabric the least of the march", "(5), (14)"),
+    Output("least_force", "N", "least contact force above the plate, if the foot follows the rack; on fabric the least "
+           "of the march", "(5), (14)"),
     Output("most_force", "N", "greatest force between the foot and rack or plate, impacts apart", "(5)"),
     Output("settled", "1", "1 if the foot lies on the plate when the rack is lowest: every turn is alike", "(12)",
            jumps=True),

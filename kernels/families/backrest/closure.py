@@ -164,7 +164,9 @@ def residual(d: Array, phi: Any, rho: Any, mode: int) -> tuple[Any, bool]:
     a, s, q2, k1, k2, sin_v, cos_v, both = directions(d, phi, at, s1, s2)
     weight = d[11]
     if mode == Mode.CLOSURE:
-        return moment * at.sin_d * (d[4] * s - d[6] * q2) + d[6] * weight * sin_v * at.numerator, True
+        left = moment * at.sin_d * (d[4] * s - d[6] * q2) + d[6] * weight * sin_v * at.numerator
+        # Without a radius of the pin S is a factor of the whole: its zeros solve nothing.
+        return left / divisor(s) if d[6].real == 0.0 else left, True
     if mode == Mode.TENSION:
         guide = weight * (np.sin(d[7]) + s1 * d[10] * np.cos(d[7]))
         return moment * at.sin_d * a - at.numerator * (guide + d[28] * both * s), True

@@ -207,6 +207,17 @@ def test_backrest_source_closure_needs_no_couple():
         assert got["K"] == pytest.approx(got["K_couple"], rel=1e-10)
 
 
+def test_backrest_source_closure_of_a_pin_without_radius_has_no_root_where_its_reaction_is_infinite():
+    """N2 H = 0 then: only the bracket's moment can vanish.  Zeros of S, a factor of the equation, were taken too."""
+    base = EXAMPLE | {
+        "a1": 0.62, "b1": 0.55, "a2": 0.17, "b2": 0.33, "r": 0.057, "r0": 0.0, "psi": 1.87, "yE": 0.315, "x3": 0.63,
+        "y3": 0.55, "cs": 410.0, "l0": 0.64, "rg": 0.23, "phi_lo": -1.2, "phi_hi": 1.9, "s1": -1.0,
+    }  # fmt: skip
+    roots = int(one_pose(base, 0.2, Mode.CLOSURE)["roots"])
+    reactions = [one_pose(base | {"root": k}, 0.2, Mode.CLOSURE)["N2"] for k in range(1, roots + 1)]
+    assert roots >= 1 and max(map(abs, reactions)) < 1e-8
+
+
 def test_backrest_two_close_roots_are_not_stepped_over():
     base = {k: v for k, v in ROWS[-1]["in"].items() if k in FIELDS}
     base |= EXAMPLE | {"psi": 1.0, "phi_lo": -0.125, "phi_hi": 0.5, "s1": 1.0, "s2": 1.0}

@@ -280,3 +280,34 @@ def test_the_greatest_force_counts_the_jump_where_the_rack_passes_the_plate(omeg
     got = sweep.summarise("foot", HEAVY | {"F0": 8.0, "p": -1e-3, "omega": omega}, ["most_force", "N_at_entry"]).iloc[0]
     # the rack's curvature is interpolated there
     assert got.most_force == pytest.approx(got.N_at_entry, rel=1e-7)
+
+
+@pytest.mark.parametrize("omega", [60.0, 150.0, 300.0])
+@pytest.mark.parametrize("p", [-1e-3, 0.3e-3, 1.1e-3])
+def test_least_and_greatest_force_of_a_foot_that_keeps_contact_are_those_at_entry_and_top(omega, p):
+    """Between entry and top the force is linear in the sine: the node next to the plate read up to 2 % too much."""
+    design = HEAVY | {"F0": 45.0, "omega": omega, "p": p}
+    names = ["least_force", "most_force", "N_at_entry", "N_at_top"]
+    got = sweep.summarise("foot", design, names).iloc[0]
+    ends = got.N_at_entry, got.N_at_top
+    assert got.least_force == pytest.approx(min(ends), rel=1e-9)
+    assert got.most_force == pytest.approx(max(*ends, design["F0"]), rel=1e-9)
+
+
+def test_the_greatest_force_counts_where_the_foot_lands_between_two_nodes():
+    design = {"m": 0.0531, "k": 0.0, "F0": 4.673, "omega": 236.4, "Y": 2.345e-3, "p": -1.631e-3, "restitution": 0.089}
+    most = sweep.summarise("foot", design, ["most_force"]).most_force[0]
+    nodes = 144000
+    found = sweep.evaluate("foot", design, ["force"], phi=np.arange(nodes) * (2.0 * math.pi / nodes))
+    # the force falls after the landing, by less than this until the next of so many nodes
+    assert 0.0 <= most / found.force.max() - 1.0 < 3e-5
+
+
+@pytest.mark.parametrize("omega", [20.0, 60.0, 160.0])
+def test_bounces_of_a_hard_foot_die_out(omega):
+    """More than 64 of them within one step of the march were NOT_CONVERGED."""
+    hard = np.linspace(0.65, 0.8, 4)
+    table = {name: np.full(4, value) for name, value in HEAVY.items()} | {"omega": np.full(4, omega)}
+    got = sweep.summarise("foot", table | {"restitution": hard}, ["lost_angle"])
+    assert (got.status == st.OK).all()
+    assert (np.diff(got.lost_angle) > 0.0).all()

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from mpmath import mp, mpf
 
+import sweep
 from kernels import status as st
 from kernels.families import heddle
 from sweep.families import family
@@ -122,11 +123,11 @@ SOURCE = design(O2B=192.5, BC=225.0, O3C=138.5, O2O3=160.0, O4E=138.5, chi_mid=m
 def test_heddle_equal_arms_and_link_as_long_as_the_frame_turn_the_levers_alike():
     theta = np.linspace(1.4, 1.7, 7)[None, :]
     parallel = moved([SOURCE], theta)
-    near = design(**(dict(zip(FIELDS, SOURCE, strict=True)) | {
-        "O3D": 138.5, "O4F": 138.5, "O3O4": 900.0, "DF": 900.0 * (1.0 + 2.0**-52)}))  # fmt: skip
-    general = moved([near], theta)
+    lengths = dict(zip(FIELDS, SOURCE, strict=True)) | {"O3D": 138.5, "O4F": 138.5, "O3O4": 900.0}
+    # links too long and too short by more than rounding, which would make a parallelogram: their mean is the parallel
+    longer, shorter = (moved([design(**lengths | {"DF": 900.0 * (1.0 + k * 2.0**-48)})], theta) for k in (1, -1))
     for name in NAMES:
-        np.testing.assert_allclose(general[name], parallel[name], rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(0.5 * (longer[name] + shorter[name]), parallel[name], rtol=1e-12, atol=1e-12)
     chi = parallel["chi"]
     np.testing.assert_allclose(parallel["y"], 138.5 * np.sin(chi - SOURCE[5]), rtol=0, atol=1e-13)
 
@@ -254,3 +255,16 @@ def test_heddle_of_long_arms_keeps_its_discriminant_and_its_speed(arm):
             cos, sin = -(x * w + y * root) / (x * x + y * y), (x * root - y * w) / (x * x + y * y)
             rate = (a * (v * cos - u * sin) + a * e * v / c) / root
             assert abs(got["dchi"][0, k] - rate) <= 64.0 * 2.0**-53 * a / root
+
+
+def test_heddle_rounded_parallelogram_stays_one_beyond_its_dead_points():
+    """The levers pass the frame's line: rounded arms left the other lever behind, so errors were those of a jump."""
+    lengths = {"O2B": 36.2, "BC": 150.97, "O3C": 60.03, "O2O3": 162.85, "O4E": 154.71, "chi_mid": 2.1, "side_C": -1.0}
+    same = {"O3D": 53.96, "O4F": 53.96, "O3O4": 411.44, "DF": 411.44}
+    names = ["max_y", "min_y", "max_abs_d2y"]
+    got = sweep.summarise("heddle", lengths | same, names, accuracy=1e-8).iloc[0]
+    plain = sweep.summarise("heddle", lengths, names, accuracy=1e-8).iloc[0]
+    assert got.max_y == pytest.approx(lengths["O4E"], rel=1e-14)  # the shaft lever stands upright there
+    for name in names:
+        assert got[name] == plain[name]
+        assert got[f"err_{name}"] <= 1e-7 * (plain.max_y - plain.min_y)

@@ -86,8 +86,11 @@ def test_errors_cover_what_a_far_finer_march_finds():
     names = ["foot_least_force", "foot_most_force", "foot_impact_speed"]
     found = sweep.summarise(machine, of_machine(FOOT), names, accuracy=1e-8).iloc[0]
     fine = sweep.evaluate("feed_foot", RACK | FOOT, "y_rack, force", phi=np.arange(14400) * (TURN / 14400))
-    error = found.foot_least_force - fine.force[fine.y_rack > 0.0].min()
-    assert 0.0 < error < found.err_foot_least_force < 3.0 * error and error < 1e-5 * FOOT["F0"]
+    force = fine.force.to_numpy()
+    lowest = int(np.where(fine.y_rack > 0.0, force, np.inf).argmin())
+    a, b, c = force[lowest - 1 : lowest + 2]
+    least = b - (c - a) ** 2 / (8.0 * (a - 2.0 * b + c))
+    assert abs(found.foot_least_force - least) <= found.err_foot_least_force < 1e-9 * FOOT["F0"]
     assert abs(found.foot_most_force - fine.force.max()) <= found.err_foot_most_force + 1e-12
 
 
