@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 
 from kernels import status as st
 from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
-from sweep.effects.base import Effect, largest
+from sweep.effects.base import Bend, Effect, largest
 from sweep.effects.link_loads import tree_of
 from sweep.effects.load_effects import axis_of, loads_of, relative
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.loads import magnitude
 from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
-from sweep.families.base import Columns, Output, Parameter
+from sweep.families.base import Columns, Output, Parameter, floats
 from sweep.families.link_tree import LinkJoint, LinkTree
+from sweep.families.sites import AXES
 
 EQUATION = "docs/links.md (10)-(12)"
 FORMULAS = (
@@ -118,6 +119,15 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     return found_columns | {"status": status}
 
 
+def _across(scene: Scene, joint: LinkJoint) -> Array:
+    """Signed force on a joint across the slot of the output link, (n, m, 1): it passes zero as it changes walls."""
+    names = [f"force_{joint.name}_{x}" for x in AXES]
+    force = np.stack(floats(compute_loads(scene, frozenset(names)), *names), axis=2)
+    wall = scene.links.bodies[:, :, tree_of(scene).output, 18:21]
+    across: Array = (force * wall).sum(axis=2, keepdims=True)
+    return across
+
+
 @lru_cache
 def contact_of(name: str) -> Effect:
     """Make the entry of the contacts of a family with a tree of links."""
@@ -134,6 +144,11 @@ def contact_of(name: str) -> Effect:
         only_for={p.name: tuple(o.name for o in _outputs(joint)) for joint in joints for p in _inputs(joint)},
         outputs=tuple(o for joint in joints for o in _outputs(joint)),
         compute=compute,
+        bends=tuple(
+            Bend(tuple(o.name for o in _outputs(joint)[1:]), partial(_across, joint=joint), zero=True)
+            for joint in joints
+            if joint.touch != "strap"
+        ),
         called_for="wear and stress of slots, eccentrics, balls",
         negligible="largest pressure below 100 MPa",
         advise=largest(compute, f"stress_{joints[0].name}", "pressure", 100.0, "MPa"),

@@ -42,7 +42,7 @@ CAREFUL = 3.0  # ... times this: a tent's tip, anywhere on the panel, is up to 2
 LATELY = 0.25  # share of the previous polynomial's error in the bound: halving a panel halves the error of a kink
 # Next to a reversal the sign of friction comes from a speed that is only rounding: nearer poses are noise.
 NARROWEST = 1e-11  # width of a panel [rad] that can only hold a jump
-VANISHED = 1e-6  # share of the size below which a root counts as a zero
+VANISHED = 1e-4  # share of the size below which a root counts as a zero: of a cube root of forces of 1e-12
 EDGE = 2.0**17  # times EPS of the size: change over NARROWEST/4 of a curve with a slope of six sizes per radian
 CROWD = 48  # number of small panels of one curve beyond which only rounding is being halved
 ALLOWED = 1.0 / 32.0  # share of the target by which two successive polynomials may differ
@@ -170,7 +170,7 @@ def _block(
         late = late[~noise]
         status[top.row[late]] = np.where(status[top.row[late]] == st.OK, st.NOT_CONVERGED, status[top.row[late]])
         at = rows[top.row]
-        answer.value[at] = -top.value if request.mode == -1 else top.value
+        answer.value[at] = 0.0 - top.value if request.mode == -1 else top.value
         answer.phi[at], answer.err[at], answer.err_phi[at] = np.mod(top.phi, TWO_PI), top.err + rounding, top.err_phi
     return status
 

@@ -186,6 +186,23 @@ def test_mean_pressure_where_the_force_turns_is_as_good_as_its_error() -> None:
     assert abs(found["rms_stress_c"] - exact) <= found["err_rms_stress_c"] + 3e-9 * exact
 
 
+DWELL = {"k": 3.0, "a": 0.4, "tau": -1.0, "m_link": 1e-5, "j_link_zz": 1e-4, "contact_radius_b": 0.5}
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "row"),
+    [("slotted", "c", FORK), ("geared_dwell", "b", DWELL | {"speed": OMEGA, "contact_length_b": 0.5})],
+)
+def test_least_stress_of_a_slot_whose_walls_take_turns_is_zero(name, joint, row):
+    """A ball's goes to 0 like a cube root: no designs with such a slot converged."""
+    wanted = [f"{kind}_{of}_{joint}" for kind in ("min", "max") for of in ("stress", "pv")]
+    found = sweep.summarise(name, row, wanted, accuracy=1e-8).iloc[0]
+    dense = sweep.evaluate(name, row, [f"stress_{joint}"], phi=PHI)[f"stress_{joint}"]
+    assert dense.min() < 0.4 * dense.max() and found["status"] == st.OK
+    for low, high in zip(wanted[:2], wanted[2:], strict=True):
+        assert found[low] == 0.0 and found[f"err_{low}"] <= 1e-14 * found[high]
+
+
 @pytest.mark.parametrize("force", [50.0, 100.0])
 def test_least_stress_of_a_roller_that_is_pulled_off_is_zero(force):
     """It goes to 0 like a root where the force passes zero: poses beside that place only say that it is small."""
