@@ -206,7 +206,8 @@ def _climbed(
     tops: list[Top] = []
     while panels.row.size:
         # Of tops as high as each other none is dropped by rounding.
-        panels = only(panels, _upper(panels, request.mode) >= best[panels.row] - LEVEL * EPS * np.abs(best[panels.row]))
+        level = LEVEL * EPS * np.maximum(np.abs(best), size)
+        panels = only(panels, _upper(panels, request.mode) >= (best - level)[panels.row])
         # The even first panels may all be within the target: a constant, or a dwell.
         crowded = panels.high - panels.low < 0.25 * TWO_PI / PANELS
         crowded &= np.bincount(panels.row[crowded], minlength=n)[panels.row] > CROWD
@@ -219,10 +220,10 @@ def _climbed(
         top = _tops(halves, request.mode, AGAIN * miss)
         settled, at_end = miss <= tolerance, (top.phi <= halves.low) | (top.phi >= halves.high)
         if locate:
-            settled &= (top.err_phi <= target) | at_end | (miss <= LEVEL * EPS * np.abs(top.value))
+            settled &= (top.err_phi <= target) | at_end | (miss <= level[halves.row])
         off = _off(family, designs, halves, top, request, np.flatnonzero(settled & ~narrow))
         settled &= off <= tolerance
-        top.err[:] += AGAIN * off + np.where(at_end, EDGE * EPS * size[halves.row], 0.0)
+        top.err[:] += AGAIN * off + np.where(at_end, EDGE, 4.0) * EPS * size[halves.row]
         ends = only(halves, narrow)
         held = _held(ends, np.repeat(panels.peak, 2)[narrow], size)
         held.err[:] += AGAIN * _beside(family, designs, ends, request)
@@ -264,16 +265,18 @@ def _off(family: Family, designs: Array, panels: Panels, top: Top, request: Requ
 
 
 def _tops(panels: Panels, mode: int, err: Array) -> Top:
-    """Maxima of the polynomials, whose heights are off by ``err`` at most."""
-    x, value = summits(panels.series, mode)
-    derived = (chebyshev.chebder(panels.series, order, axis=1).T for order in (1, 2))
-    slope, bow = (np.abs(chebyshev.chebval(x, of, tensor=False)) for of in derived)
-    half = 0.5 * (panels.high - panels.low)
+    """Maxima of the polynomials, whose heights are off by ``err`` at most; on a level one they may be anywhere."""
+    uneven = np.abs(panels.series[:, 1:]).sum(axis=1) > 4.0 * EPS * np.abs(panels.series[:, 0])
+    series, half = panels.series[uneven], 0.5 * (panels.high - panels.low)
+    x, value, blur = np.zeros(half.size), panels.peak.copy(), np.ones(half.size)
+    x[uneven], value[uneven] = summits(series, mode)
+    derived = (chebyshev.chebder(series, order, axis=1).T for order in (1, 2))
+    slope, bow = (np.abs(chebyshev.chebval(x[uneven], of, tensor=False)) for of in derived)
     # The slope bounds the error of a place at an end, the bend that of a place inside; poses avoid a jump at the end.
     inside = np.abs(x) < 1.0
-    held = np.where(inside, bow / SLOPE, slope)
-    blur = np.divide(err, held, out=np.full(x.size, 2.0), where=held > 0.0)
-    err_phi = half * np.minimum(blur, 2.0) + np.where(inside, 0.0, 0.5 * NARROWEST) + 8.0 * EPS * np.pi
+    held = np.where(inside[uneven], bow / SLOPE, slope)
+    blur[uneven] = np.minimum(np.divide(err[uneven], held, out=np.full(slope.size, 2.0), where=held > 0.0), 2.0)
+    err_phi = half * blur + np.where(inside, 0.0, 0.5 * NARROWEST) + 8.0 * EPS * np.pi
     return Top(panels.row, 0.5 * (panels.low + panels.high) + half * x, value, err + 4.0 * EPS * np.abs(value), err_phi)
 
 
@@ -331,8 +334,7 @@ def _measured(values: Array, mode: int) -> Array:
 
 def _places(low: Array, high: Array) -> Array:
     """Nodes of panels, kept off the ends, where the curve may already have jumped."""
-    nodes, _ = basis()
-    places = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * nodes
+    places = 0.5 * (low + high)[:, None] + 0.5 * (high - low)[:, None] * basis()[0]
     return _inside(places, low[:, None], high[:, None])
 
 

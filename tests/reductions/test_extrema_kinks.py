@@ -216,6 +216,17 @@ def test_the_place_of_a_levers_dwell_errs_by_its_whole_length(start, branch, cha
     assert found.err_phi0 == pytest.approx(found.err_phi_ext + found.err_phi_fold)
 
 
+def test_a_rest_at_zero_is_one_hill_although_rounding_falls_below_it_behind_its_end():
+    """The cycloidal rise begins with -1e-18: the place was the end of the rest, with an error of 2e-4 rad."""
+    cams = {"lift": [0.3, 0.4, 0.5], "rise": [1.1, 1.5, 0.9], "dwell": [0.7, 0.4, 1.2], "fall": [1.2, 1.3, 1.1]}
+    cams |= {"r0": [3.0] * 3, "e": [0.4] * 3, "law": [3.0] * 3}
+    for accuracy in (1e-3, 1e-6, 1e-9):
+        found = sweep.summarise("cam", cams, ["phi_min_s"], accuracy=accuracy)
+        begins = np.array(cams["rise"]) + cams["dwell"] + cams["fall"]
+        before = np.mod(found.phi_min_s - begins + 0.1, 2.0 * np.pi) - 0.1
+        assert (np.maximum(before, 2.0 * np.pi - begins - before) <= found.err_phi_min_s + 1e-3).all()
+
+
 def test_a_curve_that_is_all_noise_is_not_converged_and_its_error_says_so():
     """Noise of 1e-6 of the size: no halving makes it agree to 1e-9."""
     value, err, _, status = searched(lambda x: np.cos(x) + 1e-6 * np.sin(1e9 * x), 0)
