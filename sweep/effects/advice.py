@@ -54,7 +54,7 @@ class Finding(NamedTuple):
         advice, side = self.advice, "below" if self.advice.negligible else "not below"
         numbers = f"{advice.worst:.3g}, {side} {advice.threshold:.3g}{advice.unit and f' {advice.unit}'}"
         if not (self.wanted or advice.negligible):
-            return f"{advice.quantity[0].upper()}{advice.quantity[1:]} is large; ask for `{self.name}`: {numbers}"
+            return f"{advice.quantity[0].upper()}{advice.quantity[1:]} is large ({numbers}); ask for `{self.name}`"
         verdict = {
             (True, True): "wanted, but will not matter",
             (True, False): "matters",
