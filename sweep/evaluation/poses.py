@@ -200,5 +200,7 @@ def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
             guess = elsewhere(mechanism, name) or guess
             if name in output_names(mechanism):
                 guess = f"; {name} is one of a whole turn, ask `summarise`"
+            if name in (*mechanism.parameter_names, mechanism.domain.name):
+                guess = f"; {name} is a column of the table, keep= repeats it in the result"
             raise InputError("want", name, f"{known}{guess}", f"pose outputs of {mechanism.name}")
     return [name for name in wanted if name != "status"]

@@ -296,6 +296,8 @@ def _known(family: Family, name: str) -> str:
     near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])
     if name in family.pose_names:
         near = f"; {name} is one of a single pose, ask `evaluate`"
+    if name in family.parameter_names:
+        near = f"; {name} is a parameter: a dataset has it, and keep= repeats it in a result"
     if name in BOXES and isinstance(family, Chain):
         near = f"; {name} is one of a stage, as {name}1; of a machine there is one of all its members"
     if of_effects:
