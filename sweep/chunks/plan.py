@@ -19,7 +19,7 @@ from sweep.chunks.chunk import output_columns
 from sweep.chunks.parameters import parameter_ns, runs_matrix
 from sweep.families.base import Array, Unit, Work
 from sweep.families.names import is_error, without_error
-from sweep.quantities.kinds import requests
+from sweep.quantities.kinds import is_windowed
 from sweep.quantities.resolve import resolve
 from sweep.quantities.units import internal_unit
 from sweep.reductions.steps import is_proven
@@ -304,7 +304,7 @@ def _output_column(study: Study, name: str, dtype: str) -> Column:
     asked = resolve(study.family, plain)
     definition = asked.output
     text = f"{error_words(study, plain)} of {definition.name}" if is_error(name) else definition.text
-    if study.window is not None and not is_error(name) and any(r.windowed for r in requests(study.family, asked, True)):
+    if study.window is not None and not is_error(name) and is_windowed(study.family, asked):
         text += ", in the window from {:g} to {:g} of the stroke".format(*study.window)
     return Column(name, dtype, internal_unit(definition.unit), text, "output")
 

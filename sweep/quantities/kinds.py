@@ -169,3 +169,8 @@ def requests(family: Family, asked: Quantity, windowed: bool) -> tuple[Request, 
             return ()
     inside = windowed and family.pose_output[asked.of].windowed
     return tuple(Request(asked.of, mode, inside, place) for mode in modes)
+
+
+def is_windowed(family: Family, asked: Quantity) -> bool:
+    """Whether a quantity is taken inside the window of the stroke, if there is one."""
+    return any(one.windowed for one in requests(family, asked, True))

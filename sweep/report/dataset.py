@@ -21,6 +21,8 @@ from sweep.families.base import Family
 from sweep.families.machines.machine import Machine
 from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
+from sweep.quantities.kinds import is_windowed
+from sweep.quantities.resolve import find
 from sweep.report.quantities import Quantity, quantity
 from sweep.report.scan import Cells, Scan, divided_axes, scan
 from sweep.study.load import study_of
@@ -61,7 +63,13 @@ class Dataset:
 
     def shown(self, name: str) -> Quantity:
         """Return a column's display form."""
-        return quantity(name, self.units.get(name, ""))
+        form, family = quantity(name, self.units.get(name, "")), self.study.family
+        asked = None if self.study.window is None else find(family, name)
+        return (
+            form
+            if asked is None or not is_windowed(family, asked)
+            else replace(form, words=f"{form.words} in the window")
+        )
 
     @property
     def objective(self) -> Quantity | None:
