@@ -311,3 +311,13 @@ def test_bounces_of_a_hard_foot_die_out(omega):
     got = sweep.summarise("foot", table | {"restitution": hard}, ["lost_angle"])
     assert (got.status == st.OK).all()
     assert (np.diff(got.lost_angle) > 0.0).all()
+
+
+@pytest.mark.parametrize("more", [1.02, 1.2, 1.4])
+def test_the_softest_spring_on_a_feed_rack_leaves_the_foot_just_no_force(more):
+    """It was the softest at the nodes: the force fell below zero between them, by up to 7e-5 of the preload."""
+    p = RACK | {"y_plate": 1.55, "m": 0.05, "k": 0.0, "F0": 4.0, "omega": 20.0}
+    p["F0"] = more * sweep.summarise("feed_foot", p, ["F0_min_contact"]).F0_min_contact[0]
+    p["k"] = sweep.summarise("feed_foot", p, ["k_min_contact"]).k_min_contact[0]
+    assert p["k"] > 0.0
+    assert abs(sweep.summarise("feed_foot", p, ["least_force"]).least_force[0]) < 5e-7 * p["F0"]
