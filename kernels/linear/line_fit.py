@@ -1,4 +1,4 @@
-"""Straightest coupler point: the inner linear problem of a guided four-bar (docs/guide.md, section 9.2).
+"""Straightest coupler point: the inner linear problem of a guided four-bar (docs/guide.md, Straightest lines).
 
 For a coupler with the pin B and the direction d = (C - B)/|C - B|, both complex, and a line of direction lam,
 
