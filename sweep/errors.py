@@ -66,6 +66,12 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 4]} ..."
 
 
+def reason(error: OSError) -> str:
+    """Say what the operating system refuses, and for which file, without the number of the error."""
+    words = error.strerror or str(error)
+    return f"{words} ({error.filename})" if error.filename else words
+
+
 def how_many(count: int, thing: str, ending: str = "s") -> str:
     """Write a count with its noun, ``1 chunk`` or ``3 chunks``; ``ending`` is that of the plural."""
     return f"{count} {thing}{'' if count == 1 else ending}"

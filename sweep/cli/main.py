@@ -18,7 +18,7 @@ from typing import Any, TextIO
 import click
 from click.shell_completion import CompletionItem
 
-from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied, nearest
+from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied, nearest, reason
 from sweep.jobs.signals import leaving_within
 
 SIGNALLED = 128  # plus the number of the signal: the exit code that a shell expects of an interrupted command
@@ -115,7 +115,7 @@ class Verbs(click.Group):
             if error.errno == errno.EPIPE:  # the reader has closed the pipe, which click handles
                 raise
             gone = isinstance(error, FileNotFoundError) and not _is_here()
-            words = "the folder it was started in is not there any more; go to another one" if gone else error
+            words = "the folder it was started in is not there any more; go to another one" if gone else reason(error)
             _last_words(f"sweep: {words}")
             ctx.exit(StoreError.exit_code)
         except MemoryError:

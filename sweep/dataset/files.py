@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import StoreError
+from sweep.errors import StoreError, reason
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,7 +89,7 @@ def unwritable(place: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise StoreError(f"{place}: cannot be written: {error}") from error
+        raise StoreError(f"{place}: cannot be written: {reason(error)}") from error
 
 
 @contextlib.contextmanager
