@@ -254,17 +254,17 @@ def feasible_designs(study: Study, number: int) -> tuple[Array, int]:
     on their locus like the designs of the sweep.
     """
     count, tried = study.space.count, 0
-    kept = np.empty((0, len(study.family.parameters)))
+    feasible = np.empty((0, len(study.family.parameters)))
     for most in TRIED:
         runs = -(-count // RUN)
         chosen = range(runs) if count <= most else _spread(most // RUN, runs)
         designs, status = runs_matrix(study, [(k * RUN, min((k + 1) * RUN, count)) for k in chosen])
         cascade = Cascade(study, keep=False)
         cascade.feed(np.arange(len(designs)), designs, status)
-        kept, tried = cascade.end(()).designs, len(designs)
-        if len(kept) or tried == count:
+        feasible, tried = cascade.end(()).designs, len(designs)
+        if len(feasible) or tried == count:
             break
-    return spread_rows(kept, number), tried
+    return spread_rows(feasible, number), tried
 
 
 def spread_rows(designs: Array, number: int) -> Array:
@@ -301,10 +301,10 @@ def error_words(study: Study, name: str) -> str:
 
 def _output_column(study: Study, name: str, dtype: str) -> Column:
     plain = without_error(name)
-    asked = resolve(study.family, plain)
-    definition = asked.output
+    want = resolve(study.family, plain)
+    definition = want.output
     text = f"{error_words(study, plain)} of {definition.name}" if is_error(name) else definition.text
-    if study.window is not None and not is_error(name) and is_windowed(study.family, asked):
+    if study.window is not None and not is_error(name) and is_windowed(study.family, want):
         text += ", in the window from {:g} to {:g} of the stroke".format(*study.window)
     return Column(name, dtype, internal_unit(definition.unit), text, "output")
 

@@ -79,8 +79,8 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     if kind == "xlsx":
         click.echo(f"xlsx: {write_workbook(folder, out or _place(folder, 'results.xlsx'))}")
         return
-    found = chosen(folder, design)
-    refuse_degrees(found.family.domain, phi)
+    choice = chosen(folder, design)
+    refuse_degrees(choice.family.domain, phi)
     if kind in OF_DATASETS:
         target = out or _place(folder, f"{design or 'result'}.{kind}")
         click.echo(f"{kind}: {write_sheet(folder, design, target, phi)}")
@@ -88,9 +88,8 @@ def export(folder: Path, design: str | None, kind: str, out: Path | None, phi: f
     if out is None:
         name = f"{design or 'result'}{'-law' if kind == 'law' else ''}{FORMATS[kind][0]}"
         out = _place(folder, name)
-    click.echo(
-        f"{kind}: {write(found.family, found.design, out, kind, phi=phi, poses=poses, speed=found.speed, angles='rad')}"
-    )
+    path = write(choice.family, choice.design, out, kind, phi=phi, poses=poses, speed=choice.speed, angles="rad")
+    click.echo(f"{kind}: {path}")
 
 
 def _place(folder: Path, name: str) -> Path:

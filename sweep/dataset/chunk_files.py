@@ -135,12 +135,12 @@ def parts(folder: Path) -> list[ChunkFile]:
     InputError
         if the folder holds other files, which Parquet readers would take for data.
     """
-    found, strangers = listing(folder)
+    chunks, strangers = listing(folder)
     strangers = [path for path in strangers if not path.name.startswith("_")]  # pandas and pyarrow ignore these
     if strangers:
         names = ", ".join(path.name for path in strangers[:3])
         raise InputError("file", names, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
-    return found
+    return chunks
 
 
 def required_parts(folder: str | Path, verb: str) -> tuple[Path, list[ChunkFile]]:

@@ -75,11 +75,11 @@ def _commit() -> str | None:
 
 
 @contextmanager
-def logged(folder: Path, said: str, jobs: int, backend: str) -> Iterator[list[str]]:
+def logged(folder: Path, command_line: str, jobs: int, backend: str) -> Iterator[list[str]]:
     """Log the start and the end of a run: the error that ended it, or the words that the caller appends to the list."""
     identity = {"run": uuid.uuid4().hex[:12]}
     begin = time.monotonic()
-    files.append_run(folder, identity | {"event": "start", "command": said} | circumstances(jobs, backend))
+    files.append_run(folder, identity | {"event": "start", "command": command_line} | circumstances(jobs, backend))
     words: list[str] = []
     try:
         yield words
@@ -162,8 +162,8 @@ def run(
             _compile(model, jobs, phases)
             chunk_size = None if force else _within_budget(model, jobs, lambda k, of: phases.say("planning", k, of))
         folder = files.results_folder(model.name, smoke) if out is None else files.located(out)
-        said = command(model, folder, smoke, accuracy, certify)
-        with locked(folder), logged(folder, said, jobs, backend) as end, at_work(place):
+        command_line = command(model, folder, smoke, accuracy, certify)
+        with locked(folder), logged(folder, command_line, jobs, backend) as end, at_work(place):
             computed = _sweep(model, folder, jobs, place, force, chunk_size, progress)
             if not is_part(folder):
                 search(model, folder, jobs, backend, progress)
@@ -202,8 +202,8 @@ class KernelStep:
 
     def words(self, number: int, functions: int) -> str:
         """Describe a step for progress: the functions compiled for it so far, and its outputs."""
-        asked = asked_outputs(self.study)
-        names = asked[number] if number < len(asked) else ["the search over proportions"]
+        steps = asked_outputs(self.study)
+        names = steps[number] if number < len(steps) else ["the search over proportions"]
         return (
             f"steps, {how_many(functions, 'function')} compiled for {', '.join(names[:3])}{' ...' * (len(names) > 3)}"
         )

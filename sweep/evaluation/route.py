@@ -158,48 +158,48 @@ Composed: TypeAlias = tuple[Array, Array, NDArray[np.generic]]
 """Values of an output that is composed of others, their errors (of no meaning on samples), and the status."""
 
 
-def _error(found: Columns, name: str) -> Array:
+def _error(columns: Columns, name: str) -> Array:
     """Error of an output; 0 on samples, where it has none."""
-    return np.asarray(found.get(error_of(name), 0.0), np.float64)
+    return np.asarray(columns.get(error_of(name), 0.0), np.float64)
 
 
-def negative(of: str, designs: Array, found: Columns) -> Composed:
+def negative(of: str, designs: Array, columns: Columns) -> Composed:
     """Compute the negative of an output, which is minimised to maximise the output."""
-    values = np.asarray(found[of], np.float64)
-    return -np.abs(values) if by_magnitude(of) else -values, _error(found, of), found["status"]
+    values = np.asarray(columns[of], np.float64)
+    return -np.abs(values) if by_magnitude(of) else -values, _error(columns, of), columns["status"]
 
 
-def extent(box: Box, designs: Array, found: Columns) -> Composed:
+def extent(box: Box, designs: Array, columns: Columns) -> Composed:
     """Compute the extent of a mechanism from the largest and smallest coordinates of its joints."""
     still = [np.asarray(piece(designs), np.float64) for piece in box.still]
     ends = []
     errors: Array = np.zeros(len(designs))
-    for which, extremum in ((0, np.maximum), (1, np.minimum)):
-        names = [pair[which] for pair in box.reductions]
-        values = floats(found, *names)
+    for end, extremum in ((0, np.maximum), (1, np.minimum)):
+        names = [pair[end] for pair in box.reductions]
+        values = floats(columns, *names)
         ends.append(extremum.reduce([*values, *still]))  # nan where a joint's extremum is nan: its status says why
-        errors = errors + np.maximum.reduce([_error(found, name) for name in names])
+        errors = errors + np.maximum.reduce([_error(columns, name) for name in names])
     errors = errors + 4.0 * ROUNDING * np.maximum(np.abs(ends[0]), np.abs(ends[1]))
-    return ends[0] - ends[1], errors, found["status"]
+    return ends[0] - ends[1], errors, columns["status"]
 
 
-def difference(timing: Timing, designs: Array, found: Columns) -> Composed:
+def difference(timing: Timing, designs: Array, columns: Columns) -> Composed:
     """Compute the difference of two crank angles, in (-pi, pi]."""
-    first, second = floats(found, *timing.places)
-    apart = second - first
-    error = _error(found, timing.places[0]) + _error(found, timing.places[1])
-    return apart - TWO_PI * np.ceil((apart - np.pi) / TWO_PI), error, found["status"]
+    first, second = floats(columns, *timing.places)
+    interval = second - first
+    error = _error(columns, timing.places[0]) + _error(columns, timing.places[1])
+    return interval - TWO_PI * np.ceil((interval - np.pi) / TWO_PI), error, columns["status"]
 
 
-def value_at(machine: Machine, reading: EventValue, designs: Array, found: Columns) -> Composed:
+def value_at(machine: Machine, reading: EventValue, designs: Array, columns: Columns) -> Composed:
     """Compute a pose output at a crank angle of each design; the angle's error times the slope adds to its error."""
     place = reading.places[0]
-    phi = np.asarray(found[place], np.float64)
+    phi = np.asarray(columns[place], np.float64)
     finite = np.isfinite(phi)
     near = np.where(finite, phi, 0.0)[:, None] + SLOPE * np.array([0.0, -1.0, 1.0])
     poses, pose_status = pose_columns(machine, designs, near, [reading.of.name])
     values = np.where(finite[:, None], poses[reading.of.name], np.nan)
-    status = np.where(found["status"] == st.OK, pose_status[:, 0], found["status"]).astype(np.uint8)
+    status = np.where(columns["status"] == st.OK, pose_status[:, 0], columns["status"]).astype(np.uint8)
     slope = np.abs(values[:, 2] - values[:, 1]) / (2.0 * SLOPE)
     rounding = shaken(machine, designs, near[:, 0], reading.of.name) + 4.0 * ROUNDING * np.abs(values[:, 0])
-    return np.where(status == st.OK, values[:, 0], np.nan), slope * _error(found, place) + rounding, status
+    return np.where(status == st.OK, values[:, 0], np.nan), slope * _error(columns, place) + rounding, status

@@ -75,7 +75,7 @@ def write_law(
     else:
         matrix, _ = design_matrix(family, design)
         angles, text = equal_steps(domain, matrix, poses), domain.text
-    found = evaluate(mechanism, design, names, phi=angles, angles="rad")
+    motion = evaluate(mechanism, design, names, phi=angles, angles="rad")
     units = {o.name: o.unit for o in family.pose_outputs} | {domain.name: domain.unit}
     units = {name: _unit(family, name, of.replace("length", unit)) for name, of in units.items()}
     texts = {o.name: o.text for o in family.pose_outputs} | {domain.name: text}
@@ -83,8 +83,8 @@ def write_law(
     if speed is not None and not isinstance(domain, Interval):
         columns["t"] = (angles - angles[0]) / speed
         units["t"], texts["t"] = "s", "time"
-    columns |= {name: found[name].to_numpy(np.float64) for name in names}
-    columns["status"] = found["status"].to_numpy()
+    columns |= {name: motion[name].to_numpy(np.float64) for name in names}
+    columns["status"] = motion["status"].to_numpy()
     if path.suffix.lower() == ".parquet":
         import pyarrow.parquet as pq
 

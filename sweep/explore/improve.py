@@ -43,10 +43,10 @@ def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, 
     )  # fmt: skip
 
 
-def improve(problem: Problem, design: Mapping[str, float], asked: Callable[[], bool]) -> dict[str, Any]:
-    """Search from a design until it converges or ``asked`` returns true, and return the best result in either case."""
+def improve(problem: Problem, design: Mapping[str, float], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Search from a design until it converges or ``should_stop`` returns true, and return the best result so far."""
     start = np.array([design[name] for name in problem.family.parameter_names])
-    result = search(0, problem, start, asked, LOOKS)
+    result = search(0, problem, start, should_stop, LOOKS)
     return {
         "design": dict(zip(problem.family.parameter_names, result.design.tolist(), strict=True)),
         "ended": result.ended,

@@ -83,7 +83,7 @@ class Progress:
         self.stream = sys.stderr if stream is None else stream
         self.show = show and self.stream is not None
         self.begin = self.moved = time.monotonic()
-        self.said: float | None = None
+        self.line_time: float | None = None
         self.first = done
         self.bar: tqdm[Never] | None = None
         self.lock, self.over = threading.RLock(), threading.Event()
@@ -109,7 +109,7 @@ class Progress:
         with self._listener():
             if self.bar is not None:
                 self.bar.close()
-            elif self.show and (not self.quiet or self.said is not None or self._is_due()):
+            elif self.show and (not self.quiet or self.line_time is not None or self._is_due()):
                 self._line()
 
     @property
@@ -151,7 +151,7 @@ class Progress:
 
     def _is_due(self) -> bool:
         now = time.monotonic()
-        return now - self.begin > FIRST_SECONDS if self.said is None else now - self.said > LINE_SECONDS
+        return now - self.begin > FIRST_SECONDS if self.line_time is None else now - self.line_time > LINE_SECONDS
 
     def _line_if_due(self) -> None:
         if self.show and self._is_due():
@@ -171,15 +171,15 @@ class Progress:
         return (self.moved - self.begin) * share - (now - self.moved)
 
     def _line(self) -> None:
-        self.said = time.monotonic()
-        seconds = self.said - self.begin
+        self.line_time = time.monotonic()
+        seconds = self.line_time - self.begin
         text = f"{self.shown}: "
         if self.total:
             share = "" if self.at_most else f" ({self.done / self.total:.0%})"
             unit, comma, more = self.unit.partition(", ")
             text += f"{self.done} of {self.total} {unit}{share}{comma}{more}, "
         text += f"{seconds:.0f} s"
-        if self.foreseen and (left := self._left(self.said)) > 0.0:
+        if self.foreseen and (left := self._left(self.line_time)) > 0.0:
             text += f", {left:.0f} s left"
         self.stream.write(text + "\n")
         self.stream.flush()

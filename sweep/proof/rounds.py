@@ -189,10 +189,10 @@ def explored(
 
 def _split(boxes: Leaves, question: Question) -> Leaves:
     """Halve the widest side of every box until there are at least as many boxes as units."""
-    whole = question.high - question.low
+    sides = question.high - question.low
     while len(boxes.bound) < UNITS:
         low, high = boxes.low, boxes.high
-        widest = np.argmax((high - low) / whole, axis=1)
+        widest = np.argmax((high - low) / sides, axis=1)
         rows = np.arange(len(low))
         middle = 0.5 * (low[rows, widest] + high[rows, widest])
         first, second = boxes.taken(rows), boxes.taken(rows)

@@ -130,10 +130,10 @@ def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
         if not residual <= KKT:
             late = data.optimum.get("ended") == "time"
             faults.append(f"the optimiser {'had no time left to settle' if late else 'did not settle'}")
-        asked = None if data.study.tolerance is None else data.study.tolerance.robust
-        made = value_of(data.optimum, "yield")
-        if asked is not None and made < asked:
-            faults.append(f"as it is made: {share_words(made, asked, str(data.optimum.get('ended')))}")
+        wanted_yield = None if data.study.tolerance is None else data.study.tolerance.robust
+        share = value_of(data.optimum, "yield")
+        if wanted_yield is not None and share < wanted_yield:
+            faults.append(f"as it is made: {share_words(share, wanted_yield, str(data.optimum.get('ended')))}")
         if objective is not None and scanned.best_row:
             best, value = scanned.best_row[objective.name], value_of(data.optimum, objective.name)
             if not compared(objective.name, value) <= compared(objective.name, best) + BEHIND * abs(best):
@@ -141,16 +141,16 @@ def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
 
 
-def share_words(made: float, asked: float | None, ended: str, agree: int = 1) -> str:
+def share_words(share: float, wanted_yield: float | None, ended: str, agree: int = 1) -> str:
     """Describe the yield of manufactured mechanisms, the wanted yield, and why the wanted one was not reached."""
-    if asked is None or made >= asked:
-        text = f"{100.0 * made:.1f} % within all limits"
+    if wanted_yield is None or share >= wanted_yield:
+        text = f"{100.0 * share:.1f} % within all limits"
     else:
-        text = f"{math.floor(1e4 * made) / 1e2:.2f} % within all limits"
-    if asked is None:
+        text = f"{math.floor(1e4 * share) / 1e2:.2f} % within all limits"
+    if wanted_yield is None:
         return text
-    text += f", {100.0 * asked:g} % asked"
-    if made < asked:
+    text += f", {100.0 * wanted_yield:g} % asked"
+    if share < wanted_yield:
         return f"{text}: not reached{', its search used up its evaluations before' if ended == 'looks' else ''}"
     return f"{text}, met by {agree} searches" if agree > 1 else text
 

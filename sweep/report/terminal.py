@@ -100,13 +100,13 @@ def _optimum(data: Dataset) -> list[str]:
     held = [f"{s.shown.words} ({s.bound})" for s in active]
     words = [w.strip() for w in str(data.optimum.get("active") or "").split(";")]
     held += [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
-    made = float(data.optimum.get("yield", math.nan))
-    asked = None if data.study.tolerance is None else data.study.tolerance.robust
+    share = float(data.optimum.get("yield", math.nan))
+    wanted_yield = None if data.study.tolerance is None else data.study.tolerance.robust
     ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
     return [
         f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {held_back(held, ended)}",
-        *([f"as it is made: {share_words(made, asked, ended, agree)}"] if math.isfinite(made) else []),
+        *([f"as it is made: {share_words(share, wanted_yield, ended, agree)}"] if math.isfinite(share) else []),
     ]
 
 

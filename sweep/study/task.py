@@ -148,15 +148,15 @@ def read_study_task(file: StudyFile, mechanism: object) -> SynthesisTask | None:
 
 def task_model(kind: str) -> type[Section]:
     """Return the model of [task] for one kind of task, with a key for each field of the task's class."""
-    own = [f for f in fields(KINDS[kind]) if f.init]
-    needed = [f.name for f in own if f.default is MISSING and f.default_factory is MISSING]
-    return _table(kind, {"kind": (Any, "")} | {f.name: _key(kind, f.name) for f in own}, needed)
+    keys = [f for f in fields(KINDS[kind]) if f.init]
+    needed = [f.name for f in keys if f.default is MISSING and f.default_factory is MISSING]
+    return _table(kind, {"kind": (Any, "")} | {f.name: _key(kind, f.name) for f in keys}, needed)
 
 
 def _table(name: str, keys: Mapping[str, tuple[Any, str]], required: Iterable[str] = ()) -> type[Section]:
     """Return the model of a table with the given keys, each with its type and the description of its values."""
-    own: dict[str, Any] = {key: (kind | None, Field(None, description=words)) for key, (kind, words) in keys.items()}
-    model = create_model(name, __base__=Section, **own)
+    hints: dict[str, Any] = {key: (kind | None, Field(None, description=words)) for key, (kind, words) in keys.items()}
+    model = create_model(name, __base__=Section, **hints)
     model.required = tuple(required)
     return model
 

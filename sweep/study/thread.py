@@ -93,11 +93,11 @@ def read_threads(file: StudyFile) -> dict[str, dict[str, Any]] | None:
 
 
 def _relation(section: ThreadSection, key: Key, faults: Faults) -> dict[str, Any]:
-    found = section.model_dump(exclude_none=True, exclude={"allowed"})
-    found["thread"] = found.pop("path", [])
+    fields = section.model_dump(exclude_none=True, exclude={"allowed"})
+    fields["thread"] = fields.pop("path", [])
     if section.allowed is not None:
-        found["allowed"] = _allowed(section.allowed, (*key, "allowed"), faults)
-    return found
+        fields["allowed"] = _allowed(section.allowed, (*key, "allowed"), faults)
+    return fields
 
 
 def _allowed(table: AllowedTable, key: Key, faults: Faults) -> dict[str, list[float]]:

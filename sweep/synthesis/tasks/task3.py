@@ -75,10 +75,10 @@ class Task3(Task):
         for setting in self.settings:
             if all(first[name] == value for name, value in setting.asked.items()):
                 raise InputError("settings", setting, "another swing or phi0 than the first", "Task3")
-        asked = sum(len(setting.asked) for setting in self.settings)
-        if asked > len(self.unknowns):
+        count = sum(len(setting.asked) for setting in self.settings)
+        if count > len(self.unknowns):
             allowed = f"at most {len(self.unknowns)} swings and phi0 in all, or g_range, alpha_range"
-            raise InputError("settings", asked, allowed, "Task3")
+            raise InputError("settings", count, allowed, "Task3")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
