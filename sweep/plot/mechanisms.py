@@ -24,7 +24,7 @@ from sweep.plot.drawing import COLOURS, mechanism_figure
 from sweep.quantities.units import speed_given
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, crank_axis, house_style, new_figure
 from sweep.report.live import lowest, without_jumps
-from sweep.report.quantities import quantity
+from sweep.report.quantities import LENGTHS, quantity
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -107,7 +107,7 @@ def motion(
     design : one design, or several as rows of a table: one line each, named by the table's index
     want : pose outputs, as a list or in one string separated by commas; by default position and derivatives, deviations
         and pressure angles
-    unit : the length unit of the design, for the axes
+    unit : the length unit of the design, for the axes: mm, um, cm, m or in
     speed : speed of the driving shaft [rad/s], or a text such as "7000 rpm": adds scales of velocity, acceleration and
         jerk in time
     angles : the unit of the angles of ``design``, "rad" or "deg", as of :func:`sweep.evaluate`
@@ -130,6 +130,8 @@ def motion(
     family = find_family(mechanism)
     if isinstance(family.domain, Interval):
         raise InputError("mechanism", family.name, "a mechanism that turns: this one runs over an interval", "plot")
+    if unit not in LENGTHS:
+        raise InputError("unit", unit, ", ".join(LENGTHS), "plot")
     names = list(dict.fromkeys(motion_curves(family))) if want is None else pose_wants(family, want)
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
     design = in_radians(family, design, angles)

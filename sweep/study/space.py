@@ -108,15 +108,13 @@ class DesignSpace:
         """Smallest and largest value of every swept parameter."""
         return {axis.name: (axis.low, axis.high) for axis in self.axes}
 
-    def columns(self, start: int, stop: int, names: Sequence[str] | None = None) -> dict[str, Array]:
+    def columns(self, start: int, stop: int) -> dict[str, Array]:
         """Return parameter values of the designs start to stop - 1, one array per parameter in the family's order.
 
-        ``names`` are the wanted parameters, None for all.  A design has the same bits in every slice.
-        Measured on one core, per design and swept parameter: lattice 9 to 16 ns, sample 1 ns, sample on a log scale
-        180 ns.
+        A design has the same bits in every slice.  Measured on one core, per design and swept parameter: lattice
+        9 to 16 ns, sample 1 ns, sample on a log scale 180 ns.
         """
-        wanted = self.names if names is None else names
-        return dict(zip(wanted, self.matrix(start, stop, wanted).T.copy(), strict=True))
+        return dict(zip(self.names, self.matrix(start, stop, self.names).T.copy(), strict=True))
 
     def matrix(self, start: int, stop: int, names: Sequence[str]) -> Array:
         """Return the named parameters of designs start to stop - 1 as a matrix, (stop - start, P)."""
@@ -141,20 +139,19 @@ class DesignSpace:
                 matrix[:, column] = axis.at(matrix[:, column])
         return matrix
 
-    def columns_at(self, index: NDArray[np.int64], names: Sequence[str] | None = None) -> dict[str, Array]:
-        """Return parameter values of designs by their numbers, in any order, one array per parameter."""
+    def columns_at(self, index: NDArray[np.int64], names: Sequence[str]) -> dict[str, Array]:
+        """Return the named parameters of designs by their numbers, in any order, one array per parameter."""
         swept = self._swept(names)
         if self.kind == "product":
             values = self._lattice(index, swept)
         else:
             values = [self.axes[k].at(place) for k, place in zip(swept, self._sequence.at(index, swept), strict=True)]
         by_name = {self.axes[k].name: column for k, column in zip(swept, values, strict=True)}
-        wanted = self.names if names is None else names
-        return {name: by_name[name] if name in by_name else np.full(index.size, self.fixed[name]) for name in wanted}
+        return {name: by_name[name] if name in by_name else np.full(index.size, self.fixed[name]) for name in names}
 
-    def _swept(self, names: Sequence[str] | None) -> list[int]:
-        """Return the indices of the wanted axes."""
-        return [k for k, axis in enumerate(self.axes) if names is None or axis.name in names]
+    def _swept(self, names: Sequence[str]) -> list[int]:
+        """Return the indices of the named axes."""
+        return [k for k, axis in enumerate(self.axes) if axis.name in names]
 
     def _lattice(self, index: NDArray[np.int64], wanted: Sequence[int]) -> list[Array]:
         columns: list[Array] = []

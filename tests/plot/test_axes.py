@@ -55,6 +55,8 @@ def test_motion_has_a_panel_for_each_curve_and_draws_it():
     assert len(sweep.plot.motion("rssr", RSSR)) == 5  # psi, three derivatives, pressure angle
     with pytest.raises(sweep.InputError, match="did you mean 'd2psi'"):
         sweep.plot.motion("rssr", RSSR, ["d2psy"])
+    with pytest.raises(sweep.InputError, match="unit = 'furlong'; allowed: mm"):
+        sweep.plot.motion("rssr", RSSR, unit="furlong")
     with pytest.raises(sweep.InputError, match="1 to 20 designs"):
         sweep.plot.motion("rssr", pd.DataFrame(RSSR, index=range(21)))
 

@@ -165,10 +165,11 @@ def test_some_columns_of_some_designs_have_the_bits_of_the_whole(space: DesignSp
     whole = space.columns(0, space.count)
     names = data.draw(st.lists(st.sampled_from("abcdefg"), unique=True))
     index = np.array(data.draw(st.lists(st.integers(0, space.count - 1), max_size=20)), np.int64)
-    first, some = space.columns(0, space.count, names), space.columns_at(index, names)
-    assert list(first) == list(some) == names
-    for name in names:
-        assert first[name].tobytes() == whole[name].tobytes()
+    matrix, some = space.matrix(0, space.count, names), space.columns_at(index, names)
+    assert matrix.shape == (space.count, len(names))
+    assert list(some) == names
+    for name, values in zip(names, matrix.T, strict=True):
+        assert values.tobytes() == whole[name].tobytes()
         assert some[name].tobytes() == whole[name][index].tobytes()
 
 
