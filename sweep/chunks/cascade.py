@@ -204,8 +204,8 @@ class Cascade:
         goes_on = np.ones(status.size, np.bool_)
         if study.fit is not None:
             driving = [batch.outputs[name] for name in driving_outputs(study.family) if name in batch.outputs]
-            known = (driving[0], driving[1]) if len(driving) == 2 and bool(np.all(status == codes.OK)) else None
-            designs, fit_status = fit_line(study.family, designs, study.fit, study.window, known)
+            pair = (driving[0], driving[1]) if len(driving) == 2 and bool(np.all(status == codes.OK)) else None
+            designs, fit_status = fit_line(study.family, designs, study.fit, study.window, pair)
             status[:] = fit_status
             goes_on = fit_status == codes.OK
         for limit in study.parameter_limits:

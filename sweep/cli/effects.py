@@ -303,12 +303,12 @@ def parts(group: Sequence[Effect]) -> list[tuple[str, list[str], Rows]]:
     Inputs that an effect takes from one that it needs are not repeated.  Rows of several effects form one table, rows
     of all links or joints of link trees are merged into one.
     """
-    known = [{p for name in entry.needs for p in every_input(effect(name))} for entry in group]
+    inputs = [{p for name in entry.needs for p in every_input(effect(name))} for entry in group]
     kinds = {
         "output": [_output_rows(entry.outputs) for entry in group],
         "output per design": [_design_rows(entry) for entry in group],
         "input": [
-            _input_rows(p for p in every_input(entry) if p not in old) for entry, old in zip(group, known, strict=True)
+            _input_rows(p for p in every_input(entry) if p not in old) for entry, old in zip(group, inputs, strict=True)
         ],
     }
     listed = [places_of(entry) for entry in group]

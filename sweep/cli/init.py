@@ -134,5 +134,5 @@ def schema_text() -> str:
 
 def _shared_schema(into: Path) -> Path | None:
     """Return the schema that a project keeps for all its studies, docs/study.schema.json, if ``into`` lies in one."""
-    here = into.resolve()
-    return next((file for up in (here, *here.parents) if (file := up / "docs" / SCHEMA).is_file()), None)
+    folder = into.resolve()
+    return next((file for up in (folder, *folder.parents) if (file := up / "docs" / SCHEMA).is_file()), None)

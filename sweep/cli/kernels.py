@@ -135,9 +135,9 @@ def warm(what: tuple[str, ...], jobs: int | None) -> None:
     """
     first, then = rounds(what or ("studies",))
     workers = jobs or os.cpu_count() or 1
-    with stop_on_signal() as stop, Progress("compiling", len(first) + len(then), 0, True, unit="parts") as shown:
-        compile_parts(first, workers, stop, shown.advance)
-        compile_parts(then, workers, stop, shown.advance)
+    with stop_on_signal() as stop, Progress("compiling", len(first) + len(then), 0, True, unit="parts") as bar:
+        compile_parts(first, workers, stop, bar.advance)
+        compile_parts(then, workers, stop, bar.advance)
 
 
 @click.group()

@@ -147,16 +147,16 @@ def _made(source: str, table: Path | None, options: Options) -> dict[str, tuple[
 def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
     """Draw one design of a folder, or of a family and a table."""
     mechanism, design = _design(source, table, options["design"], options["row"], several=what == "motion")
-    known: dict[str, dict[str, Any]] = {
+    keywords: dict[str, dict[str, Any]] = {
         "motion": {"want": options["want"]},
         "mechanism": {"phi": options["phi"], "view": options["view"], "positions": options["positions"]},
     }
     if table is None:
         refuse_degrees(mechanism.domain, options["phi"])
     if what == "cyclogram":
-        known[what] = {"made": _made(source, table, options)}
+        keywords[what] = {"made": _made(source, table, options)}
     unit: AngleUnit | None = "rad" if table is None else options["angles"]
-    return getattr(plot, what)(mechanism, design, angles=unit, **known.get(what, {}))
+    return getattr(plot, what)(mechanism, design, angles=unit, **keywords.get(what, {}))
 
 
 def _design(source: str, table: Path | None, design: str | None, row: int, several: bool = False) -> tuple[Any, Any]:

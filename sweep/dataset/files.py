@@ -280,8 +280,8 @@ def altered(place: Path, note: Mapping[str, Any], names: Iterable[str]) -> list[
     note : content of ``_plan.json``
     names : names of the tables
     """
-    known, current = note.get(TABLES) or {}, digests(place, names)
-    return [name for name in names if name not in current or known.get(name, current[name]) != current[name]]
+    recorded, current = note.get(TABLES) or {}, digests(place, names)
+    return [name for name in names if name not in current or recorded.get(name, current[name]) != current[name]]
 
 
 def check_tables(folder: Path, names: Iterable[str]) -> None:

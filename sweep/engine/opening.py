@@ -24,21 +24,21 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
 
     ``chunk_size`` is that of a new plan, if an estimate has chosen it already.
     """
-    noted = files.read_plan(folder)
-    if noted is not None:
-        plan = make_plan(study, noted["chunk_size"])
-        if plan.identity == noted["identity"]:
+    note = files.read_plan(folder)
+    if note is not None:
+        plan = make_plan(study, note["chunk_size"])
+        if plan.identity == note["identity"]:
             # The chunks keep the study as the first run wrote it, even if it is now written in other units.
-            plan = replace(plan, name=noted["name"], chunk_data=noted["chunk_data"])
+            plan = replace(plan, name=note["name"], chunk_data=note["chunk_data"])
             if force:
                 _set_foreign_aside(folder, plan, ())
             return plan
-        if _differs_in_limits_only(study, noted, plan):  # the old designs are sorted by the new limits
+        if _differs_in_limits_only(study, note, plan):  # the old designs are sorted by the new limits
             old_folder = _set_foreign_aside(folder, plan, OWN_FILES)
             files.write_plan(folder, plan_note(study, folder, plan) | {"known": old_folder})
             return plan
         if not force:
-            raise store.foreign(folder, _conflict(study, noted, plan), plan)
+            raise store.foreign(folder, _conflict(study, note, plan), plan)
     plan = make_plan(study, chunk_size)
     if force:
         _set_foreign_aside(folder, plan, OWN_FILES)
@@ -109,17 +109,17 @@ def words_of(study: Study) -> dict[str, Any]:
 
 def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
     """Return the content of ``_plan.json``, with an earlier run's notes about the optimum."""
-    noted = files.read_plan(folder) or {}
+    note = files.read_plan(folder) or {}
     return plan.as_dict() | {
         **words_of(study),
         "optimise": study.optimise is not None,
-        "optimised": noted.get("optimised"),
+        "optimised": note.get("optimised"),
         "pareto": study.pareto is not None,
-        "counts": noted.get("counts"),
-        "missed": noted.get("missed"),
-        "known": noted.get("known"),
-        TABLES: noted.get(TABLES),
-        **({"part": noted["part"]} if "part" in noted else {}),
+        "counts": note.get("counts"),
+        "missed": note.get("missed"),
+        "known": note.get("known"),
+        TABLES: note.get(TABLES),
+        **({"part": note["part"]} if "part" in note else {}),
         "complete": False,
     }
 

@@ -96,10 +96,10 @@ def merge(study: str | Path, out: str | Path, *, smoke: bool = False) -> Merged:
     """
     model, folder = load_study(study, smoke=smoke), files.located(out)
     places = sorted((files.beside(folder) / PARTS).glob(f"*/{files.DESIGNS}"))
-    noted = files.read_plan(folder)
-    if noted is None or not places:
+    note = files.read_plan(folder)
+    if note is None or not places:
         raise InputError("folder", str(out), "a folder that sweep split has prepared", "merge")
-    plan = make_plan(model, noted["chunk_size"])
+    plan = make_plan(model, note["chunk_size"])
     taken, damaged = 0, []
     with locked(folder):
         present = store.finished_chunks(folder, plan)

@@ -298,14 +298,14 @@ def _compute(
     failure: Exception | None = None
     allowed = math.inf if force else study.budget.seconds
     done = plan.designs - sum(len(range(*plan.bounds(index))) for index in missing)
-    with Progress(study.name, plan.designs, done, progress) as shown:
+    with Progress(study.name, plan.designs, done, progress) as bar:
         results = 0
         for result in _results(task, missing, jobs, place, stop, allowed):
             results += not result.dropped
             if result.error is not None:
                 failure = failure or result.error
                 stop.set()
-            shown.advance(result.designs)
+            bar.advance(result.designs)
     if failure is not None:
         raise failure
     stop.raise_if_signalled(folder, "finished chunks are")

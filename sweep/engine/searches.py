@@ -67,8 +67,8 @@ def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     key = optimum_key(study, note)
     place = files.beside(folder)
     survey = optimise.read_survey(place / files.OPTIMUM)
-    noted = [name for name in files.OF_OPTIMUM if name in (note.get(TABLES) or {})]
-    intact = not altered(place, note, {files.OPTIMUM, *noted})
+    recorded = [name for name in files.OF_OPTIMUM if name in (note.get(TABLES) or {})]
+    intact = not altered(place, note, {files.OPTIMUM, *recorded})
     if note.get("optimised") == key and intact and (survey is None or survey.ended != "time"):
         return
     assert study.optimise is not None
@@ -94,17 +94,17 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
 
     note = files.read_plan(folder) or {}
     key = optimum_key(study, note)
-    place, noted = files.beside(folder), dict(note.get(TABLES) or {})
+    place, recorded = files.beside(folder), dict(note.get(TABLES) or {})
     damaged = altered(place, note, [files.PARETO])
     if damaged:
         (place / files.PARETO).unlink(missing_ok=True)
-    if files.PARETO in noted and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
-        del noted[files.PARETO]  # the hash of an earlier front: the new one grows step by step
-        files.write_plan(folder, note | {TABLES: noted})
+    if files.PARETO in recorded and (damaged or metadata(place / files.PARETO).get(b"key") != key.encode()):
+        del recorded[files.PARETO]  # the hash of an earlier front: the new one grows step by step
+        files.write_plan(folder, note | {TABLES: recorded})
     with _stoppable(folder, "searching the front; run again to continue") as stop, Phases(progress) as phases:
         optimise.front_study(study, folder, key, lambda: bool(stop), jobs, phases.say)
-    if digests(place, [files.PARETO]).items() - noted.items():
-        files.write_plan(folder, note | {TABLES: noted | digests(place, [files.PARETO])})
+    if digests(place, [files.PARETO]).items() - recorded.items():
+        files.write_plan(folder, note | {TABLES: recorded | digests(place, [files.PARETO])})
 
 
 def refuse_unprovable(study: Study) -> None:
@@ -142,9 +142,9 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     if altered(place, note, [files.PROOF]):
         (place / files.PROOF).unlink(missing_ok=True)
     proof = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)
-    noted, current = dict(note.get(TABLES) or {}), digests(place, [files.PROOF])
-    if current.items() - noted.items():
-        files.write_plan(folder, note | {TABLES: noted | current})
+    recorded, current = dict(note.get(TABLES) or {}), digests(place, [files.PROOF])
+    if current.items() - recorded.items():
+        files.write_plan(folder, note | {TABLES: recorded | current})
     return proof.cut_short
 
 
@@ -153,11 +153,11 @@ def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool)
     assert study.optimise is not None and study.optimise.prove is not None
     boxes = study.optimise.prove.boxes
     words = "proving; run again to continue"
-    with _stoppable(folder, words) as stop, Progress("proof", boxes, 0, progress, unit="boxes") as shown:
+    with _stoppable(folder, words) as stop, Progress("proof", boxes, 0, progress, unit="boxes") as bar:
 
         def tell(judged: int, expected: int) -> None:
-            shown.expect(expected)
-            shown.advance(judged - shown.done)
+            bar.expect(expected)
+            bar.advance(judged - bar.done)
 
         where: Executor = Here() if jobs == 1 else executor(backend, jobs)
         return prove_study(study, folder, Cores(where, jobs, stop), tell)

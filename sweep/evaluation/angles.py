@@ -83,8 +83,8 @@ def in_radians(
         values = columns[key]
         if unit is not None:
             if name in map(str, table):
-                here = f"column {name} [{unit}]"
-                raise InputError("column", name, f"either {name} or {name} [{unit}], not both", here)
+                place = f"column {name} [{unit}]"
+                raise InputError("column", name, f"either {name} or {name} [{unit}], not both", place)
             if name in renamed.values():
                 raise InputError("column", name, "one heading with its unit, not two", f"column {key}")
             renamed[key] = name

@@ -31,13 +31,13 @@ def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
         for a name that is no load of this mechanism, or a value that is no curve.
     """
     curves: dict[str, Curve] = {}
-    known = curved_inputs(family) if loads else ()
+    inputs = curved_inputs(family) if loads else ()
     for name, given in (loads or {}).items():
-        if name not in known:
+        if name not in inputs:
             raise InputError(
                 "loads",
                 name,
-                f"{', '.join(known) or 'no load: no effect takes one'}{nearest(name, known)}",
+                f"{', '.join(inputs) or 'no load: no effect takes one'}{nearest(name, inputs)}",
                 family.name,
             )
         curves[name] = _curve(name, given)

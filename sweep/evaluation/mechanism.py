@@ -159,12 +159,12 @@ def _place(family: Family) -> str:
 
 def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict[str, float]:
     """Check dimensions and convert them to internal units."""
-    known = dict(inputs_beside(family, dimensions)) | {p.name: p for p in family.parameters}
+    inputs = dict(inputs_beside(family, dimensions)) | {p.name: p for p in family.parameters}
     for name in dimensions:
-        if name not in known:
-            allowed = f"{', '.join(family.parameter_names)}{nearest(name, known)}"
+        if name not in inputs:
+            allowed = f"{', '.join(family.parameter_names)}{nearest(name, inputs)}"
             raise InputError("dimension", name, allowed, _place(family))
-    return {name: _value(name, known[name], given, _place(family)) for name, given in dimensions.items()}
+    return {name: _value(name, inputs[name], given, _place(family)) for name, given in dimensions.items()}
 
 
 def _is_number(given: object) -> TypeGuard[float]:

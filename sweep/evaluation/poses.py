@@ -195,12 +195,12 @@ def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
     wanted = wanted_names(want, f"pose outputs of {mechanism.name}")
     for name in wanted:
         if name not in mechanism.pose_names and name != "status":
-            known = ", ".join(mechanism.pose_names)
+            allowed = ", ".join(mechanism.pose_names)
             guess = nearest(name, [*mechanism.pose_names, *(o.name for o in offered(mechanism))])
             guess = elsewhere(mechanism, name) or guess
             if name in output_names(mechanism):
                 guess = f"; {name} is one of a whole turn, ask `summarise`"
             if name in (*mechanism.parameter_names, mechanism.domain.name):
                 guess = f"; {name} is a column of the table, keep= repeats it in the result"
-            raise InputError("want", name, f"{known}{guess}", f"pose outputs of {mechanism.name}")
+            raise InputError("want", name, f"{allowed}{guess}", f"pose outputs of {mechanism.name}")
     return [name for name in wanted if name != "status"]

@@ -137,10 +137,10 @@ def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: 
     InputError
         for an unknown name, or an accuracy that the family's domain or the output does not support.
     """
-    known, key, prices = _known(family), (tuple(wanted), accuracy, windowed), costs.table()
-    if key not in known or known[key][0] is not prices:
-        known[key] = prices, _routes(family, wanted, accuracy, windowed)
-    return known[key][1]
+    cached, key, prices = _known(family), (tuple(wanted), accuracy, windowed), costs.table()
+    if key not in cached or cached[key][0] is not prices:
+        cached[key] = prices, _routes(family, wanted, accuracy, windowed)
+    return cached[key][1]
 
 
 @of_family

@@ -20,8 +20,8 @@ def meaning(code: int) -> str:
 
 def meanings(codes: Iterable[int]) -> list[str]:
     """Meanings of many status codes, in order."""
-    known: dict[int, str] = {}
-    return [known.setdefault(int(code), meaning(code)) for code in codes]
+    texts: dict[int, str] = {}
+    return [texts.setdefault(int(code), meaning(code)) for code in codes]
 
 
 def explained(columns: Columns, names: Iterable[str]) -> Columns:

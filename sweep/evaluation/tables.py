@@ -65,14 +65,14 @@ def design_matrix(
     InputError
         for a missing or misspelt column, a value that is not a finite number, or a wrong sign.
     """
-    known = [*family.parameter_names, *extra]
+    names = [*family.parameter_names, *extra]
     keys = _column_names(table)
     for name in keys:
-        if name not in known and name not in unused:
-            guess = nearest(name, [k for k in known if k not in keys])
+        if name not in names and name not in unused:
+            guess = nearest(name, [k for k in names if k not in keys])
             if guess:
-                raise InputError("column", name, f"the columns {', '.join(known)}{guess}", "table")
-    columns = {name: numbers(table[key], name, f"column {name}, row") for name, key in keys.items() if name in known}
+                raise InputError("column", name, f"the columns {', '.join(names)}{guess}", "table")
+    columns = {name: numbers(table[key], name, f"column {name}, row") for name, key in keys.items() if name in names}
     unread = {name: np.asarray(table[key]) for name, key in keys.items() if name in unused and name not in columns}
     rows = _row_count(columns | unread)
     matrix = np.empty((rows, len(family.parameters)))

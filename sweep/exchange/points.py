@@ -130,18 +130,18 @@ def reader_of(family: str) -> Hardpoints:
     mechanism = find_family(family)
     reader = mechanism.find(Hardpoints)
     if reader is None:
-        known = [name for name in NAMES if find_family(name).find(Hardpoints) is not None]
-        raise InputError("family", mechanism.name, f"one of {', '.join(known)}", "points")
+        families = [name for name in NAMES if find_family(name).find(Hardpoints) is not None]
+        raise InputError("family", mechanism.name, f"one of {', '.join(families)}", "points")
     return reader
 
 
 def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) -> dict[str, Array]:
-    known = (*reader.needs, *reader.may)
+    names = (*reader.needs, *reader.may)
     for name in points:
-        if name not in known:
-            raise InputError("point", name, choices(name, known), "points")
+        if name not in names:
+            raise InputError("point", name, choices(name, names), "points")
     given = {}
-    for name in known:
+    for name in names:
         if name not in points:
             if name in reader.needs:
                 kind = "a direction" if name.startswith("axis_") else "a point"

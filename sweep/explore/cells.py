@@ -58,12 +58,12 @@ def cells(
     columns = {name: _column(hand.folder, merit, name) for name in names}
     shown = {name: limited(hand.data, name) for name in columns}
     design = _column(hand.folder, merit, "design").values
-    kept = np.ones(design.size, np.bool_)
+    within = np.ones(design.size, np.bool_)
     for name, ends in dict(ranges).items():
         low, high = sorted(float(end) / shown[name].factor for end in ends)
         room = 1e-9 * (columns[name].high - columns[name].low)
-        kept &= (columns[name].values >= low - room) & (columns[name].values <= high + room)
-    rows = np.flatnonzero(kept)
+        within &= (columns[name].values >= low - room) & (columns[name].values <= high + room)
+    rows = np.flatnonzero(within)
     number = design if rows.size == design.size else design[rows]
     places = {name: _places(hand.folder, merit, name, bins) for name in dict.fromkeys(chain.from_iterable(pairs))}
     if rows.size < design.size:
@@ -102,8 +102,8 @@ def _places(folder: Path, merit: str, name: str, bins: int) -> Places:
 def _column(folder: Path, merit: str, name: str) -> Column:
     """Read a column of the feasible designs, the best first."""
     values = _read(folder, name)[_order(folder, merit)]
-    known = values[np.isfinite(values)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    finite = values[np.isfinite(values)]
+    low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
     return Column(values, low, high if high > low else low + (abs(low) or 1.0))
 
 

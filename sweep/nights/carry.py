@@ -48,8 +48,8 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
     """
     for night in earlier:
         source = night / target.name / files.DESIGNS
-        noted = files.read_plan(source)
-        if noted is None or make_plan(study, noted["chunk_size"]).identity != noted["identity"]:
+        plan = files.read_plan(source)
+        if plan is None or make_plan(study, plan["chunk_size"]).identity != plan["identity"]:
             continue
         try:
             verification = verify(source, designs=0)
@@ -72,8 +72,8 @@ def carry(study: Study, earlier: Sequence[Path], target: Path) -> Carried | None
             # This file is appended to, so it is copied.
             if (files.beside(source) / files.RUNS).is_file():
                 shutil.copyfile(files.beside(source) / files.RUNS, target / files.RUNS)
-            same = all(noted.get(key) == words for key, words in words_of(study).items())  # titles are in the report
-            whole = not verification.findings and bool(noted.get("complete")) and same and searched(study, target)
+            same = all(plan.get(key) == words for key, words in words_of(study).items())  # titles are in the report
+            whole = not verification.findings and bool(plan.get("complete")) and same and searched(study, target)
             if whole:
                 _link_report(files.beside(source), target)
         return Carried(night.name, len(sound), whole)

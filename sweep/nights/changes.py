@@ -173,8 +173,8 @@ def slower(name: str, seconds: float, history: Sequence[NightRecord]) -> Changes
         for night in history
         if name in night.studies and night.studies[name].state == "complete" and not night.studies[name].linked
     ]
-    known = [time for time in times if time is not None]
-    before, last = known[:-1][-MOST_NIGHTS:], known[-1:]
+    measured = [time for time in times if time is not None]
+    before, last = measured[:-1][-MOST_NIGHTS:], measured[-1:]
     if len(before) < LEAST_NIGHTS or seconds < LEAST_SECONDS:
         return Changes(0, ())
     allowed = SLOWER_FACTOR * median(before)

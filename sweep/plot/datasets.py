@@ -49,10 +49,10 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
     data, scanned, cells = gather(Path(folder))
     pair = None
     if x is not None or y is not None:
-        known = [c.name for c in cells]
+        names = [c.name for c in cells]
         for name in (x, y):
-            if name not in known:
-                raise InputError("axis", name, f"two of {', '.join(known)}", str(folder))
+            if name not in names:
+                raise InputError("axis", name, f"two of {', '.join(names)}", str(folder))
         pair = next(((a, b) for a, b in ((x, y), (y, x)) if (a, b) in scanned.grids), None)
         if pair is None:
             raise InputError("axes", [x, y], "two different swept parameters", str(folder))

@@ -183,7 +183,7 @@ def _limits(
             links[2 * number : 2 * number + 2] = study.space.bounds[name]
         elif name in study.space.fixed:
             links[2 * number : 2 * number + 2] = study.space.fixed[name]
-    known = {"rotatable", *study.prescribed}
+    satisfied = {"rotatable", *study.prescribed}
     for limit in study.limits:
         name = limit.output
         if name == "max_pressure_angle" and limit.maximum is not None:
@@ -193,7 +193,7 @@ def _limits(
         elif name in provable.links:
             ends = links[2 * provable.links.index(name) :][:2]
             ends[:] = max(ends[0], limit.ends[0]), min(ends[1], limit.ends[1])
-        elif name not in known and not (name in entries and meets(limit, np.array(entries[name])).all()):
+        elif name not in satisfied and not (name in entries and meets(limit, np.array(entries[name])).all()):
             left_out.append(name)
     return cos2, links, tuple(left_out)
 

@@ -171,10 +171,10 @@ def explored(
         missing = (k for k in range(UNITS) if not unit.path(k).is_file())
         for _, count in cores.place.outcomes(unit, missing, cores.jobs, cores.stop):
             counts.append(count)
-            here = sum(counts)
+            step = sum(counts)
             # A unit that used its whole share has boxes left.
             further = int(settings.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
-            tell(judged + here, judged + here * UNITS // len(counts) + further)
+            tell(judged + step, judged + step * UNITS // len(counts) + further)
         if cores.stop:
             return Explored(joined([*done, todo]), judged, True, seconds)
         results = [_read(path) for path in _finished(unit)]

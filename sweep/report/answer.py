@@ -180,12 +180,12 @@ def _sweep_sentences(data: Dataset, scanned: Scan) -> list[str]:
     feasible = scanned.feasible
     share = number(100.0 * feasible / max(data.designs, 1), 3)
     text = f"Of {_count(data.designs)} designs in the sweep {_count(feasible)} ({share} %) meet all limits"
-    shown = data.objective
-    if shown is None or data.optimum is None or not scanned.best_row:
+    objective = data.objective
+    if objective is None or data.optimum is None or not scanned.best_row:
         return [text + "."]
-    best = shown.show(scanned.best_row[shown.name])
+    best = objective.show(scanned.best_row[objective.name])
     source = "" if data.survey is not None and data.survey.populations else ", from where the optimiser went on"
-    return [f"{text}; the best of them has {shown.symbol} = {best}{source}."]
+    return [f"{text}; the best of them has {objective.symbol} = {best}{source}."]
 
 
 def search_warnings(data: Dataset) -> list[str]:
@@ -274,17 +274,18 @@ def _unconfirmed(data: Dataset) -> tuple[str, ...]:
 
 def _behind_the_front(data: Dataset) -> tuple[str, ...]:
     """Return a warning if a design of the front keeps all limits and is better than the optimum."""
-    study, shown, front, best = data.study, data.objective, data.front, data.optimum
+    study, objective, front, best = data.study, data.objective, data.front, data.optimum
     robust = study.tolerance is not None and study.tolerance.robust is not None
-    if study.pareto is None or shown is None or front is None or best is None or robust:
+    if study.pareto is None or objective is None or front is None or best is None or robust:
         return ()
     good = (front["status"] == codes.OK) & (front["kkt_residual"] <= KKT)
     for limit in study.limits:  # the front's bounds replace limits on its side
         bound = limit.minimum if study.pareto.at_least else limit.maximum
         if limit.output == study.pareto.output and bound is not None:
             good &= front["bound"] >= bound if study.pareto.at_least else front["bound"] <= bound
-    least = float(compared(shown.name, front[shown.name][good].to_numpy()).min(initial=math.inf))
+    least = float(compared(objective.name, front[objective.name][good].to_numpy()).min(initial=math.inf))
     missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
-    value = math.inf if missed else compared(shown.name, value_of(best, shown.name))
+    value = math.inf if missed else compared(objective.name, value_of(best, objective.name))
     better = math.isfinite(least) and least < value - BEHIND * abs(least)
-    return (f"the front has a better design within all limits, {shown.show(least)}: run more starts",) if better else ()
+    words = f"the front has a better design within all limits, {objective.show(least)}: run more starts"
+    return (words,) if better else ()

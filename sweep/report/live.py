@@ -40,12 +40,12 @@ SPATIAL, PLANE = ("live/three.min.js", "live/view.js"), ("live/charts.js", "live
 
 def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
     """Return the template's variables for both interactive sections as JSON, empty if there is nothing to show."""
-    shown = shown_designs(data, different)
-    motion = moving(data, shown)
-    lines = parallel(data, cells, shown)
+    designs = shown_designs(data, different)
+    motion = moving(data, designs)
+    lines = parallel(data, cells, designs)
     return {
-        "shown": shown,
-        "live_designs": [(design.name, design.role) for design in shown],
+        "shown": designs,
+        "live_designs": [(design.name, design.role) for design in designs],
         "motion_data": "" if motion is None else embedded(motion),
         "axis": "" if motion is None else motion["axis"],
         "sides": motion is not None and len({tuple(part["shift"]) for part in motion["designs"][0]["parts"]}) > 1,
@@ -85,9 +85,9 @@ FOLLOWERS = ("psi", "alpha")  # positions that are angles
 
 def without_jumps(name: str, path: Array) -> Array:
     """Return a follower's angle without jumps of a turn; any other curve unchanged."""
-    known = np.isfinite(path)
+    finite = np.isfinite(path)
     unwrapped = path.copy()
-    unwrapped[known] = np.unwrap(path[known]) if stem(name) in FOLLOWERS else path[known]
+    unwrapped[finite] = np.unwrap(path[finite]) if stem(name) in FOLLOWERS else path[finite]
     return unwrapped
 
 

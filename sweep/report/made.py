@@ -139,8 +139,8 @@ def histogram(data: Dataset, output: str) -> Histogram | None:
 def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Histogram:
     values = compared(limit.output, np.asarray(column, np.float64))
     shown = quantity(limit.output, resolve.output(data.study.family, limit.output).unit)
-    known = values[np.isfinite(values)] * shown.factor
-    low, high = np.percentile(known, (0.1, 99.9)) if known.size else (0.0, 1.0)
+    finite = values[np.isfinite(values)] * shown.factor
+    low, high = np.percentile(finite, (0.1, 99.9)) if finite.size else (0.0, 1.0)
     far = FAR * (high - low) or math.inf
     bounds = [None if x is None else x * shown.factor for x in (limit.minimum, limit.maximum)]
     bounds = [x if x is not None and low - far <= x <= high + far else None for x in bounds]
@@ -153,7 +153,7 @@ def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Hist
     first = at - width * np.ceil((at - low) / width)
     edges = first + width * np.arange(BINS + 2)
     edges[np.argmin(np.abs(edges - at))] = at
-    counts, _ = np.histogram(np.clip(known, edges[0], edges[-1]), edges)
+    counts, _ = np.histogram(np.clip(finite, edges[0], edges[-1]), edges)
     shares = counts / max(values.size, 1)
     return Histogram(shown, edges, shares, bounds[0], bounds[1], float(meets(limit, values).mean()))
 
@@ -199,17 +199,17 @@ def event_bands(data: Dataset) -> dict[str, tuple[float, float]]:
 
 def with_bands(rows: pd.DataFrame, bands: Mapping[str, tuple[float, float]]) -> pd.DataFrame:
     """Return the cyclogram in degrees with the intervals of manufactured mechanisms' events; unchanged without any."""
-    known = [bands.get(name, NOWHERE) if kind == "event" else NOWHERE
+    intervals = [bands.get(name, NOWHERE) if kind == "event" else NOWHERE
              for kind, name in zip(rows["kind"], rows["name"], strict=True)]  # fmt: skip
-    ends = {"made from [deg]": [low for low, _ in known], "made to [deg]": [high for _, high in known]}
+    ends = {"made from [deg]": [low for low, _ in intervals], "made to [deg]": [high for _, high in intervals]}
     return rows.assign(**(ends if bands else {}))
 
 
 def share_made(data: Dataset) -> float:
     """Return the share of mechanisms that keep all limits, from the largest sample known; nan without one."""
     shares = [float(row["within"]) for row in _optimum_rows(data, files.TOLERANCE) if row["output"] == "all limits"]
-    known = float((data.optimum or {}).get("yield", math.nan))
-    return known if math.isfinite(known) else next(iter(shares), math.nan)
+    share = float((data.optimum or {}).get("yield", math.nan))
+    return share if math.isfinite(share) else next(iter(shares), math.nan)
 
 
 def tolerance_words(data: Dataset) -> str:
@@ -243,16 +243,16 @@ def slopes(data: Dataset) -> list[Slope]:
     objective = data.objective
     if objective is None:
         return []
-    known = {p.name: p for p in data.study.family.parameters}
+    parameters = {p.name: p for p in data.study.family.parameters}
     ranked = []
     for row in _optimum_rows(data, files.SENSITIVITY):
         name, value = str(row["parameter"]), abs(float(row["value"]))
         if row["output"] != objective.name or not value > 0.0 or math.isnan(row["growing"]):
             continue
-        step, words = STEPS.get(known[name].unit if name in known else "", (0.1, "0.1"))
+        step, words = STEPS.get(parameters[name].unit if name in parameters else "", (0.1, "0.1"))
         share = 100.0 * step / value
         share = -share if without_minus(objective.name) else share  # sign of the displayed output for a maximised one
-        text = known[name].text if name in known else ""
+        text = parameters[name].text if name in parameters else ""
         ranked.append(Slope(name, text, words, share * row["growing"], -share * row["shrinking"]))
     return sorted(ranked, key=lambda slope: -slope.largest)
 

@@ -217,21 +217,21 @@ def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str
     """Draw the best objective of each cell over one or two axes, by default the pair with the largest variation."""
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
-    shown = data.objective
+    objective = data.objective
     if pair is None:
-        if shown is None and scanned.feasible == data.designs:
+        if objective is None and scanned.feasible == data.designs:
             return None  # all of one colour
         pair = most_telling(scanned)
     if pair is not None:
         x, y = pair
         at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
-        return map_figure(scanned.grids[pair], *sides, data.designs, shown, at, overlays(data.study, x, y))
+        return map_figure(scanned.grids[pair], *sides, data.designs, objective, at, overlays(data.study, x, y))
     if len(cells) == 1 and scanned.feasible:
         name = cells[0].name
         side = cells[0], axis_quantity(data, name)
         return line_figure(
-            scanned.lines[name], side, data.designs, shown, {r: float(row[name]) for r, row in marks.items()}
+            scanned.lines[name], side, data.designs, objective, {r: float(row[name]) for r, row in marks.items()}
         )
     return None
 

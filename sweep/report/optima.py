@@ -178,24 +178,24 @@ class Optimum:
 
 def optima(data: Dataset, distinct: list[Group]) -> list[Optimum]:
     """Return the cards of the first optima, with pictures to one scale; empty if there is only one."""
-    shown, names = data.objective, data.study.bare.parameter_names
+    objective, names = data.objective, data.study.bare.parameter_names
     tilts = {name for name in names if name.endswith("_tilt")}  # tilts of nominal designs are zero
-    if len(distinct) < 2 or shown is None:
+    if len(distinct) < 2 or objective is None:
         return []
     distinct = distinct[:CARDS]
     drawn = [drawn_parts(data.study.family, group.row) for group in distinct]
     span = max((extent([stage.part for stage in placed]) for placed in drawn if placed), default=0.0)
-    best = float(distinct[0].row[shown.name])
+    best = float(distinct[0].row[objective.name])
     cards = []
     for k, (group, placed) in enumerate(zip(distinct, drawn, strict=True)):
-        value = float(group.row[shown.name])
+        value = float(group.row[objective.name])
         lines = parameter_rows(data, group.row, 4)
         title = group.title(k)
         cards.append(
             Optimum(
                 title,
-                f"{shown.words} {shown.show(value)}",
-                "" if k == 0 else change(shown, value, best),
+                f"{objective.words} {objective.show(value)}",
+                "" if k == 0 else change(objective, value, best),
                 group.starts,
                 group.mirrored,
                 _made(data, group.row),
@@ -209,17 +209,17 @@ def optima(data: Dataset, distinct: list[Group]) -> list[Optimum]:
 
 def optima_sentence(data: Dataset, distinct: list[Group]) -> str:
     """Return a sentence about the number of different optima, for the answer."""
-    shown = data.objective
-    if len(distinct) < 2 or shown is None:
+    objective = data.objective
+    if len(distinct) < 2 or objective is None:
         return ""
-    value, best = (float(group.row[shown.name]) for group in (distinct[1], distinct[0]))
-    difference = change(shown, value, best)
-    same = sum(abs(float(group.row[shown.name]) - best) <= AGREE * abs(best) for group in distinct)
+    value, best = (float(group.row[objective.name]) for group in (distinct[1], distinct[0]))
+    difference = change(objective, value, best)
+    same = sum(abs(float(group.row[objective.name]) - best) <= AGREE * abs(best) for group in distinct)
     text = f"The search ended in {len(distinct)} structurally different optima"
     text += f", {same} of them with the best value" if same > 1 else ""
     row = distinct[1].row
     paper = row.get("role") == "nominal"
-    text += f"; the {'best on paper' if paper else 'next'} has {shown.show(value)}"
+    text += f"; the {'best on paper' if paper else 'next'} has {objective.show(value)}"
     text += f" ({difference})" if difference else ""
     share = _made(data, row) if paper else ""
     return f"{text}, but {share}." if share else f"{text}."
@@ -227,17 +227,17 @@ def optima_sentence(data: Dataset, distinct: list[Group]) -> str:
 
 def _made(data: Dataset, row: dict[str, Any]) -> str:
     """Describe the share of toleranced mechanisms that keep all limits."""
-    study, known = data.study, float(row.get("yield", math.nan))
+    study, share = data.study, float(row.get("yield", math.nan))
     limits = [limit for limit in study.output_limits if not limit.is_equation]
     if not limits:
         return ""
-    if not math.isfinite(known):
+    if not math.isfinite(share):
         sample = toleranced(data, row, SAMPLES)
         if sample is None:
             return ""
         columns = design_outputs(study.family, sample[1], [x.output for x in limits], study.accuracy, study.window)
-        known = float(np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits]).mean())
-    return f"{number(100.0 * known, 3)}\u00a0% of what is made keeps all limits"
+        share = float(np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits]).mean())
+    return f"{number(100.0 * share, 3)}\u00a0% of what is made keeps all limits"
 
 
 def _extras(data: Dataset, row: dict[str, Any]) -> list[tuple[str, str]]:

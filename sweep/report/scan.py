@@ -173,8 +173,8 @@ def scan(
             other = sense * compared(second, batch[second])
             both = ok & np.isfinite(other)
             points = np.column_stack([score, other])
-            known = np.vstack([result.front, points[both]])
-            result.front = known[non_dominated(*known.T)]
+            points_so_far = np.vstack([result.front, points[both]])
+            result.front = points_so_far[non_dominated(*points_so_far.T)]
             sampled = points[offset::stride]
             samples.append(sampled[both[offset::stride]])
     if samples:

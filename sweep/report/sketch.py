@@ -154,8 +154,8 @@ def sketch(
 
 
 def _line(points: Array) -> str:
-    known = points[np.isfinite(points).all(axis=1)]
-    return " ".join(f"{x:.1f},{y:.1f}" for x, y in known.tolist())
+    finite = points[np.isfinite(points).all(axis=1)]
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in finite.tolist())
 
 
 def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words: str, kind: str) -> None:
@@ -164,11 +164,9 @@ def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words
     if any(math.hypot(x - a, y - b) < 3 * LINE and words == other for a, b, other, _ in taken):
         return
     for dx, dy in AROUND:
-        here = min(max(x + dx + math.copysign(half, dx) * (dx != 0), half), WIDE - half), y + dy
-        if all(
-            abs(here[0] - a) > half + 0.5 * LETTER * len(other) or abs(here[1] - b) > LINE for a, b, other, _ in taken
-        ):
-            taken.append((*here, words, kind))
+        at = min(max(x + dx + math.copysign(half, dx) * (dx != 0), half), WIDE - half), y + dy
+        if all(abs(at[0] - a) > half + 0.5 * LETTER * len(other) or abs(at[1] - b) > LINE for a, b, other, _ in taken):
+            taken.append((*at, words, kind))
             return
 
 

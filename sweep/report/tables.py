@@ -61,9 +61,9 @@ def limit_state(
     low, high = limit.ends
     room, bound = min((size - low, low), (high - size, high), key=lambda pair: pair[0])
     tolerance = ACTIVE * max(abs(bound), 1e-12)
-    known = value_of(row, error_of(limit.output))
-    if bound == 0.0 and known > tolerance:
-        tolerance = known  # relative to a limit of 0 there is no size: use the error of the value
+    error = value_of(row, error_of(limit.output))
+    if bound == 0.0 and error > tolerance:
+        tolerance = error  # relative to a limit of 0 there is no size: use the error of the value
     if math.isnan(room):
         state = "unknown"
     elif room < -tolerance:

@@ -84,18 +84,20 @@ def ending(folder: Path) -> Ending:
 
 
 def _best_of_sweep(data: Dataset, feasible: int) -> str:
-    shown = data.objective
-    if shown is None or not feasible:
+    objective = data.objective
+    if objective is None or not feasible:
         return ""
-    first = best(data.folder, shown.name, 1)[shown.name]
-    return f", the best with {shown.words} {shown.show(compared(shown.name, float(first[0])))}" if len(first) else ""
+    first = best(data.folder, objective.name, 1)[objective.name]
+    if not len(first):
+        return ""
+    return f", the best with {objective.words} {objective.show(compared(objective.name, float(first[0])))}"
 
 
 def _optimum(data: Dataset) -> list[str]:
-    shown = data.objective
-    assert shown is not None and data.optimum is not None
-    value = float(data.optimum[shown.name])
-    fast = shown.at_speed(value, data.study.speed)
+    objective = data.objective
+    assert objective is not None and data.optimum is not None
+    value = float(data.optimum[objective.name])
+    fast = objective.at_speed(value, data.study.speed)
     active = [s for s in limit_states(data) if s.state == "active"]
     held = [f"{s.shown.words} ({s.bound})" for s in active]
     words = [w.strip() for w in str(data.optimum.get("active") or "").split(";")]
@@ -104,7 +106,7 @@ def _optimum(data: Dataset) -> list[str]:
     wanted_yield = None if data.study.tolerance is None else data.study.tolerance.robust
     ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
     return [
-        f"optimum: {shown.words} {shown.show(value)}{f' ({fast})' if fast else ''}",
+        f"optimum: {objective.words} {objective.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {held_back(held, ended)}",
         *([f"as it is made: {share_words(share, wanted_yield, ended, agree)}"] if math.isfinite(share) else []),
     ]

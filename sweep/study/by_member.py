@@ -43,8 +43,8 @@ def studies_of_members(study: Study, name: str) -> dict[str, dict[str, Any]]:
     for member in order_of_design(spec, machine):
         last = f"{name}-{members[-1]}" if members else None
         members.append(member)
-        part, known = _within(spec, members)
-        studies[f"{name}-{member}"] = _tables(study, known, part, previous, f"{name}-{member}", last)
+        part, names = _within(spec, members)
+        studies[f"{name}-{member}"] = _tables(study, names, part, previous, f"{name}-{member}", last)
         previous = part
     return studies
 

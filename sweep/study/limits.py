@@ -130,8 +130,8 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
 def _around(held: Limit | None, band: Limit) -> bool:
     """Tell whether a band leaves room on both sides of the interval that the locus holds."""
     ends = (band.minimum, *((held.minimum, held.maximum) if held else ()), band.maximum)
-    known = [x for x in ends if x is not None]
-    return len(known) == 4 and known == sorted(known) and known[0] < known[1] and known[2] < known[3]
+    numbers = [x for x in ends if x is not None]
+    return len(numbers) == 4 and numbers == sorted(numbers) and numbers[0] < numbers[1] and numbers[2] < numbers[3]
 
 
 def _parameter(family: Family, name: str) -> Output | None:

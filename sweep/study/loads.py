@@ -237,15 +237,15 @@ def _file(
     except (OSError, ValueError) as error:
         faults.value(place, name, f"a table that can be read: {str(error).splitlines()[0]}")
         return None
-    known = [str(column) for column in table.columns]
+    columns = [str(column) for column in table.columns]
     for k, column in enumerate(section.columns or ()):
-        if column not in known:
-            faults.value((*key, "columns", k), column, f"columns of the file: {choices(column, known)}")
+        if column not in columns:
+            faults.value((*key, "columns", k), column, f"columns of the file: {choices(column, columns)}")
             return None
-    if len(known) < 2 or len(table) > MOST_POINTS:
+    if len(columns) < 2 or len(table) > MOST_POINTS:
         faults.value(place, name, f"two columns, angle and load, of at most {MOST_POINTS} rows")
         return None
-    pair = [table.iloc[:, known.index(column)] for column in section.columns or known[:2]]
+    pair = [table.iloc[:, columns.index(column)] for column in section.columns or columns[:2]]
     try:
         phi, values = ([float(x) for x in column] for column in pair)
     except (TypeError, ValueError):

@@ -36,22 +36,22 @@ def read_locus(file: StudyFile, bare: Family) -> tuple[OnLocus | None, dict[str,
 def _stage(family: Family, faults: Faults) -> OnLocus | None:
     first = family.stages[0]
     if first.family.find(LimitLocus) is None:
-        known = tuple(dict.fromkeys(way.family for way in LOCI))
-        faults.value(("locus",), first.family.name, f"a mechanism that is or begins with {' or '.join(known)}")
+        families = tuple(dict.fromkeys(way.family for way in LOCI))
+        faults.value(("locus",), first.family.name, f"a mechanism that is or begins with {' or '.join(families)}")
         return None
     return OnLocus(first.family.name, first.tail)
 
 
 def _prescribed(locus: OnLocus, raw: Mapping[str, Any], faults: Faults, sampled: bool) -> dict[str, Entry]:
     """Read the prescribed outputs as fixed values or axes; report and omit faulty ones."""
-    known = [p.name for p in locus.prescribed]
+    names = [p.name for p in locus.prescribed]
     ratios, phi0 = [f"{name}{locus.number}" for name in RATIOS], f"phi0{locus.number}"
     ratio = next((name for name in ratios if name in raw), ratios[0])
-    known.insert(known.index(phi0) + 1, ratio)
+    names.insert(names.index(phi0) + 1, ratio)
     for name in raw:
-        if name not in known:
+        if name not in names:
             redundant = {phi0, ratio} if {phi0, ratio} & set(raw) else set()  # either of both gives phi0
-            faults.unknown(("locus", name), [k for k in known if k not in raw and k not in redundant] or known)
+            faults.unknown(("locus", name), [k for k in names if k not in raw and k not in redundant] or names)
     entries: dict[str, Entry] = {}
     for p in locus.prescribed:
         if p.name == phi0 and ratio in raw:

@@ -159,9 +159,9 @@ def forms(p: Parameter, number: object = None) -> str:
     internal = units.internal_unit(p.unit)
     if internal == "1":
         return "a number"
-    shown, usual = 40.0 if number is None else number, _usual(internal)
+    example, usual = 40.0 if number is None else number, _usual(internal)
     article = "an" if p.unit[0] in "aeiou" else "a"
-    return f'{article} {p.unit} with its unit, as "{shown} {usual}" or {{ value = {shown}{_unit_form(p)} }}'
+    return f'{article} {p.unit} with its unit, as "{example} {usual}" or {{ value = {example}{_unit_form(p)} }}'
 
 
 def _unit_form(p: Parameter) -> str:

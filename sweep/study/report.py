@@ -56,9 +56,9 @@ def check_report(report: ReportSection, file: StudyFile, family: Family, prescri
 
     ``prescribed`` are the outputs that [locus] prescribes.
     """
-    faults, known = file.faults, family.parameter_names
+    faults, names = file.faults, family.parameter_names
     given = [name for table in ("design", "bodies", "loads") for name in file.free_table(table) or ()]
-    parameters = [*prescribed, *(name for name in given if name in known)]
+    parameters = [*prescribed, *(name for name in given if name in names)]
     for k, figure in enumerate(report.figures):
         if figure.file is not None and not re.fullmatch(r"[\w-]+\.svg", figure.file):
             faults.value(("report", "figures", k, "file"), figure.file, "letters, digits, - and _, ending in .svg")

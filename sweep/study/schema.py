@@ -76,8 +76,8 @@ def _entry() -> Schema:
 def _of_family(entry: Family) -> Schema:
     """Return the schema of [design] for mechanisms of one family."""
     parameters = {p.name: {"description": _described(p), "allOf": [ENTRY]} for p in entry.parameters}
-    known = [*parameters, *sorted(input_names(entry) - parameters.keys()), "sample", FROM, HASH]
-    design = {"properties": parameters, "propertyNames": {"enum": known}}
+    keys = [*parameters, *sorted(input_names(entry) - parameters.keys()), "sample", FROM, HASH]
+    design = {"properties": parameters, "propertyNames": {"enum": keys}}
     mechanism = {"properties": {"family": {"const": entry.name}}, "required": ["family"]}
     return {
         "if": {"properties": {"mechanism": mechanism}, "required": ["mechanism"]},

@@ -100,8 +100,8 @@ class Locus:
         results = {name: np.empty(n, matrix.dtype) for name in self.gives}
         roots = [np.ascontiguousarray(columns["root"])] if self.has_roots else []
         self.kernel(matrix, *roots, status, failed, designs, *results.values())
-        known = columns | results
-        return LocusSolutions(designs, status, failed, known["phi1"], known["start"], known["phi0"])
+        columns |= results
+        return LocusSolutions(designs, status, failed, columns["phi1"], columns["start"], columns["phi0"])
 
     def _ranges(self, matrix: Array) -> list[tuple[str, str, NDArray[np.bool_]]]:
         columns = dict(zip(self.parameter_names, matrix.T, strict=True))
@@ -153,8 +153,8 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
     """
     of_family = [form for form in LOCI if form.family == family]
     if not of_family:
-        known = tuple(dict.fromkeys(form.family for form in LOCI))
-        raise InputError("family", family, f"{' or '.join(known)}{nearest(str(family), known)}", "synthesis")
+        families = tuple(dict.fromkeys(form.family for form in LOCI))
+        raise InputError("family", family, f"{' or '.join(families)}{nearest(str(family), families)}", "synthesis")
     selected = [form for form in of_family if form.chosen_by in names]
     # A column shared with another selected form selects nothing.
     selected = [x for x in selected if not any(x.chosen_by in y.parameter_names for y in selected if y != x)]

@@ -75,8 +75,8 @@ def diagram(
     if not isinstance(samples, int | np.integer) or samples < 1:
         raise InputError("samples", samples, "a whole number from 1", "thread diagram")
     given = in_radians(family, design, angles)
-    known = {o.name for thread in threads for o in thread.outputs}
-    wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in known]
+    names = {o.name for thread in threads for o in thread.outputs}
+    wanted = [name for t in threads for name in (f"{t.name}_{key}" for key in COLUMNS) if name in names]
     events = switches(family, one_design(family, given), wanted)[0]
     turn = np.arange(samples) * (TWO_PI / samples)
     phi = np.unique(np.mod(np.concatenate([turn, events - BESIDE, events + BESIDE]), TWO_PI))

@@ -59,8 +59,8 @@ def warn_outside(values: Array, measured: Range, constants: tuple[Parameter, ...
         text = (
             f"{measured.name} = {values.min():g} to {values.max():g} {measured.unit}: {outside} of {values.size} values"
         )
-        known = f"{measured.low:g} to {measured.high:g} {measured.unit}"
-        warnings.warn(f"{text} outside {known}, where the constants were measured", MeasuredRangeWarning, stacklevel=3)
+        span = f"{measured.low:g} to {measured.high:g} {measured.unit}"
+        warnings.warn(f"{text} outside {span}, where the constants were measured", MeasuredRangeWarning, stacklevel=3)
 
 
 def computed(table: Table, units: Mapping[str, str], kernel: Callable[..., object], *arguments: Array) -> pd.DataFrame:

@@ -96,11 +96,11 @@ class FourBar:
 
     def poses(self, shape: Mapping[str, Array], angles: Angles, branch: int, wanted: tuple[str, ...]) -> list[Array]:
         """Return pose outputs of stages with a crank of 1, (n, m) each."""
-        known = family(self.family)
+        mechanism = family(self.family)
         columns = {"a": 1.0, "branch": float(branch)} | {self.dimensions[name]: part for name, part in shape.items()}
         n = len(angles.phi)
-        rows = np.column_stack([np.broadcast_to(columns.get(p.name, 0.0), n) for p in known.parameters])
-        return known.values(rows, angles, *wanted)
+        rows = np.column_stack([np.broadcast_to(columns.get(p.name, 0.0), n) for p in mechanism.parameters])
+        return mechanism.values(rows, angles, *wanted)
 
     def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
         """Return acceleration along ``lam2`` and pressure angle, if any, over a turn of the drive, (n, m)."""
