@@ -42,8 +42,8 @@ def runs_matrix(study: Study, runs: Iterable[tuple[int, int]]) -> tuple[Array, N
         return matrix, np.zeros(len(matrix), np.uint8)
     links, status = study.locus.links(columns)
     # A design without a mechanism gets a status; it raises no error.
-    given = {name: values for name, values in columns.items() if name in study.family.parameter_names}
-    matrix, _ = design_matrix(study.family, given | {name: np.ones(status.size) for name in links})
+    parameters = {name: values for name, values in columns.items() if name in study.family.parameter_names}
+    matrix, _ = design_matrix(study.family, parameters | {name: np.ones(status.size) for name in links})
     for name, values in links.items():
         matrix[:, study.family.parameter_names.index(name)] = values
     return matrix, status

@@ -52,7 +52,7 @@ def run(
     from sweep.study import load_study
 
     proof = True if certify else None
-    late: SearchCutShort | None = None
+    cut_short: SearchCutShort | None = None
     model = load_study(study, smoke=smoke)
     after: list[str] = []
     if report:
@@ -66,7 +66,7 @@ def run(
                 model, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
             )
         except SearchCutShort as error:
-            late, folder = error, error.folder
+            cut_short, folder = error, error.folder
         if is_part(folder):  # the answer is for the whole dataset, after the parts are merged
             click.echo(f"part: {folder}")
             return
@@ -75,6 +75,6 @@ def run(
             click.echo(line)
         click.echo(f"dataset: {folder}")
         code = written(folder, None, figures) if report else 0
-    if late is not None:
-        raise late
+    if cut_short is not None:
+        raise cut_short
     click.get_current_context().exit(answer.exit_code or code)

@@ -215,8 +215,8 @@ def write_plan(folder: Path, data: Mapping[str, Any]) -> None:
 
 
 def _own_hash(data: Mapping[str, Any]) -> str:
-    rest = {key: value for key, value in data.items() if key != OWN_HASH}
-    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()[:16]
+    content = {key: value for key, value in data.items() if key != OWN_HASH}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def read_table(path: Path) -> pd.DataFrame:

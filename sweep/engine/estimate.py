@@ -90,7 +90,7 @@ def estimate(
     sample = pilot(study, tell) if known is None else known
     chunk_size = choose_chunk_size(study, sample)
     designs = study.space.count
-    kept = 1.0 if study.output.keep == "all" else max(sample.feasible, LEAST_KEPT)
+    share = 1.0 if study.output.keep == "all" else max(sample.feasible, LEAST_KEPT)
     columns = describe_columns(study)
     results = sum(
         np.dtype(column.dtype).itemsize * (PACKED_ERROR if is_error(column.name) else PACKED_RESULT)
@@ -99,7 +99,7 @@ def estimate(
     )
     sampled = len(study.space.axes) * SAMPLED_VALUE_BYTES if study.space.kind == "sobol" else 0.0
     chunks = -(-designs // chunk_size)
-    work = designs * (sample.seconds_per_design + kept * WRITE_SECONDS_PER_ROW)
+    work = designs * (sample.seconds_per_design + share * WRITE_SECONDS_PER_ROW)
     # At the end of a chunk every level computes the designs that still wait there, even a few.
     work += chunks * (WRITE_SECONDS_PER_CHUNK + CALL_SECONDS * len(levels(study)))
     return Estimate(
@@ -107,9 +107,9 @@ def estimate(
         chunks=chunks,
         chunk_size=chunk_size,
         jobs=jobs,
-        kept=kept,
+        kept=share,
         memory_bytes=BASE_MEMORY_BYTES + jobs * COPIES_OF_A_CHUNK * min(chunk_size, designs) * row_bytes(study),
-        disk_bytes=designs * kept * (OTHER_BYTES_PER_ROW + sampled + results)
+        disk_bytes=designs * share * (OTHER_BYTES_PER_ROW + sampled + results)
         + chunks * (len(columns) * BYTES_PER_COLUMN + BYTES_PER_CHUNK),
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
         optimise_seconds=None if study.optimise is None else study.optimise.time_budget,

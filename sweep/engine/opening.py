@@ -130,8 +130,8 @@ WITHOUT_UNIT = ("count", "scale")  # keys of a parameter that its unit does not 
 def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
     """Describe keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
     lines = list(_lines(old, new, ""))
-    rest = [f"and {len(lines) - MOST} more"] if len(lines) > MOST else []
-    return lines[:MOST] + rest
+    more = [f"and {len(lines) - MOST} more"] if len(lines) > MOST else []
+    return lines[:MOST] + more
 
 
 def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[str]:

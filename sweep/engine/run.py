@@ -68,10 +68,10 @@ def _commit() -> str | None:
     """Commit of the sources; None where they are not a git work tree or git is missing."""
     line = ["git", "-C", str(Path(__file__).resolve().parent), "rev-parse", "HEAD"]
     try:
-        done = subprocess.run(line, capture_output=True, text=True, check=False, timeout=10)
+        process = subprocess.run(line, capture_output=True, text=True, check=False, timeout=10)
     except (FileNotFoundError, subprocess.TimeoutExpired):
         return None
-    return done.stdout.strip() or None if done.returncode == 0 else None
+    return process.stdout.strip() or None if process.returncode == 0 else None
 
 
 @contextmanager

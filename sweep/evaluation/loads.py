@@ -32,7 +32,7 @@ def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
     """
     curves: dict[str, Curve] = {}
     inputs = curved_inputs(family) if loads else ()
-    for name, given in (loads or {}).items():
+    for name, curve in (loads or {}).items():
         if name not in inputs:
             raise InputError(
                 "loads",
@@ -40,7 +40,7 @@ def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
                 f"{', '.join(inputs) or 'no load: no effect takes one'}{nearest(name, inputs)}",
                 family.name,
             )
-        curves[name] = _curve(name, given)
+        curves[name] = _curve(name, curve)
     return curves
 
 

@@ -45,8 +45,8 @@ class BoundDesign:
         self._row(family)
 
     def __repr__(self) -> str:
-        given = "".join(f", {name}={value!r}" for name, value in self.dimensions.items())
-        return f"mechanism({self.family.name}{given})"
+        arguments = "".join(f", {name}={value!r}" for name, value in self.dimensions.items())
+        return f"mechanism({self.family.name}{arguments})"
 
     def __call__(self, phi: ArrayLike) -> dict[str, Any]:
         """Compute every pose output at crank angles, as `poses` does."""
@@ -108,12 +108,12 @@ class BoundDesign:
         """Build the design matrix (1, P) of a family that effects may have extended by inputs."""
         row = self._rows.get(family.parameter_names)
         if row is None:
-            given = [self.dimensions.get(p.name, p.left_out(self.dimensions)) for p in family.parameters]
-            for p, value in zip(family.parameters, given, strict=True):
+            values = [self.dimensions.get(p.name, p.left_out(self.dimensions)) for p in family.parameters]
+            for p, value in zip(family.parameters, values, strict=True):
                 if value is None:
                     present = ", ".join(self.dimensions) or "nothing"
                     raise MissingInput(p.name, f"the {p.text}; given {present}", _place(self.family))
-            row = self._rows[family.parameter_names] = np.array([given], np.float64)
+            row = self._rows[family.parameter_names] = np.array([values], np.float64)
         return row
 
 
@@ -164,7 +164,7 @@ def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict
         if name not in inputs:
             allowed = f"{', '.join(family.parameter_names)}{nearest(name, inputs)}"
             raise InputError("dimension", name, allowed, _place(family))
-    return {name: _value(name, inputs[name], given, _place(family)) for name, given in dimensions.items()}
+    return {name: _value(name, inputs[name], value, _place(family)) for name, value in dimensions.items()}
 
 
 def _is_number(given: object) -> TypeGuard[float]:

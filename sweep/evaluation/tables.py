@@ -109,8 +109,8 @@ def plain_columns(table: Table) -> Table:
     if len(table) <= FEW and (block := table.to_numpy()).dtype.kind in "fiu":
         return dict(zip(table.columns, block.T, strict=True))
     for name, values in table.items():
-        plain = isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiu"
-        columns[name] = values.to_numpy() if plain else values
+        is_numeric = isinstance(values.dtype, np.dtype) and values.dtype.kind in "fiu"
+        columns[name] = values.to_numpy() if is_numeric else values
     return columns
 
 
@@ -149,9 +149,9 @@ def kept_columns(table: Table, keep: bool | str | Sequence[str], made: Collectio
     if keep is False:
         return {}
     keys = _column_names(table)
-    chosen = [name for name in keys if name not in made] if keep is True else wanted_names(keep, "keep")
+    names = [name for name in keys if name not in made] if keep is True else wanted_names(keep, "keep")
     columns: dict[str, Any] = {}
-    for name in chosen:
+    for name in names:
         if name not in keys:
             raise InputError("keep", name, f"columns of the table: {choices(name, keys)}", "table")
         if name in made:

@@ -91,19 +91,19 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
     (1219.631092, -1.0)
     """
     mechanism, reader = find_family(family), reader_of(family)
-    given = _checked(reader, points)
-    extent = size(given)
+    coordinates = _checked(reader, points)
+    extent = size(coordinates)
     if not extent > 0.0:
         raise InputError("points", "all one point", "points that are apart", "points")
-    reading = reader.fit(given)
-    joints = _joints(mechanism, reading, given)
-    distances = {name: float(np.linalg.norm(given[name] - at)) for name, at in joints.items()}
+    reading = reader.fit(coordinates)
+    joints = _joints(mechanism, reading, coordinates)
+    distances = {name: float(np.linalg.norm(coordinates[name] - at)) for name, at in joints.items()}
     # The first deviating point is named, since it displaces those after it as well.
     for name, distance in distances.items():
         if not distance <= tolerance * extent:
             allowed = f"a point at most {tolerance * extent:.3g} from {_words(joints[name])}"
             why = f", where the other points put it; it is {distance:.3g} off (tolerance = {tolerance:g})"
-            raise InputError(name, _words(given[name]), allowed + why, f"points of {mechanism.name}")
+            raise InputError(name, _words(coordinates[name]), allowed + why, f"points of {mechanism.name}")
     place = Placement(_triple(reading.at), _triple(reading.z), _triple(reading.x))
     return PlacedDesign(mechanism.name, reading.parameters, reading.phi, place, max(distances.values()))
 
@@ -140,7 +140,7 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
     for name in points:
         if name not in names:
             raise InputError("point", name, choices(name, names), "points")
-    given = {}
+    coordinates = {}
     for name in names:
         if name not in points:
             if name in reader.needs:
@@ -153,8 +153,8 @@ def _checked(reader: Hardpoints, points: Mapping[str, Sequence[float] | Array]) 
             if not length > 0.0:
                 raise InputError(name, at.tolist(), "a direction, not all zeros", "points")
             at = at / length
-        given[name] = at
-    return given
+        coordinates[name] = at
+    return coordinates
 
 
 def _joints(family: Family, reading: FittedPose, given: Mapping[str, Array]) -> dict[str, Array]:

@@ -75,9 +75,9 @@ def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pa
 
 def _there_and_back(ends: Array, start: float, poses: int) -> Array:
     low, high = ends
-    wide = high - low
-    run = (start - low if low < start < high else 0.0) + np.linspace(0.0, 2.0 * wide, poses + 1)
-    angles: Array = high - np.abs(np.mod(run, 2.0 * wide) - wide)
+    span = high - low
+    run = (start - low if low < start < high else 0.0) + np.linspace(0.0, 2.0 * span, poses + 1)
+    angles: Array = high - np.abs(np.mod(run, 2.0 * span) - span)
     return angles
 
 
@@ -162,8 +162,8 @@ def exists(parts: Sequence[Part]) -> bool:
 
 def _assembled(parts: Sequence[Part]) -> NDArray[np.bool_]:
     """Return the mask of poses in which every joint exists."""
-    there = [np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()]
-    return np.asarray(np.logical_and.reduce(there))
+    exists = [np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()]
+    return np.asarray(np.logical_and.reduce(exists))
 
 
 def projection(view: str) -> Array:

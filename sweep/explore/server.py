@@ -106,8 +106,8 @@ class Server:
 
         A browser that was talked into another name for this machine says so in Host; a page in another tab in Origin.
         """
-        given = request.url.path.split("/")[1].encode()
-        known = secrets.compare_digest(given, self.token.encode())
+        token = request.url.path.split("/")[1].encode()
+        known = secrets.compare_digest(token, self.token.encode())
         host, origin = request.headers.get("host", ""), request.headers.get("origin")
         return known and f"http://{host}" == self.origin and origin in (None, self.origin)
 

@@ -208,8 +208,8 @@ def drop_old(into: Path, keep: int) -> list[str]:
     names of the deleted nights.
     """
     good = good_nights(into)
-    kept = {*nights(into)[-keep:], *good[-1:]}
-    gone = [path for path in nights(into) if path not in kept]
+    retained = {*nights(into)[-keep:], *good[-1:]}
+    gone = [path for path in nights(into) if path not in retained]
     with store_errors(into):
         for path in gone:
             path.rename(into / f"{GOING}{path.name}")

@@ -138,23 +138,23 @@ def _front(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:
     now, then = (tables[1][column].to_numpy() for column in ("bound", name))
     if not (at.size and now.size):
         return ([f"front: {at.size} bounds before, {now.size} now"] if at.size != now.size else []), []
-    near = np.abs(now - at[:, None]).argmin(axis=1)
-    apart = np.abs(now[near] - at)
-    pairs = apart <= DIMENSION_RTOL * np.ptp(at)
+    nearest = np.abs(now - at[:, None]).argmin(axis=1)
+    distance = np.abs(now[nearest] - at)
+    pairs = distance <= DIMENSION_RTOL * np.ptp(at)
     lines = []
     if not len(at) == len(now) == pairs.sum():
         lines.append(f"front: {len(at)} bounds before, {len(now)} now, {pairs.sum()} of them the same")
     # Between neighbouring bounds a front is no steeper than to its neighbours; for equal bounds this allows nothing.
     slopes = np.nan_to_num(np.abs(np.diff(values) / np.diff(at)))
     steepest = np.maximum(np.append(slopes, 0.0), np.append(0.0, slopes))
-    allowed = OBJECTIVE_RTOL * np.fmax(np.abs(values), np.abs(then[near])) + steepest * apart
-    moved = np.abs(then[near] - values)
-    far = np.flatnonzero(pairs & ~(moved <= allowed) & ~(np.isnan(values) & np.isnan(then[near])))
+    allowed = OBJECTIVE_RTOL * np.fmax(np.abs(values), np.abs(then[nearest])) + steepest * distance
+    moved = np.abs(then[nearest] - values)
+    far = np.flatnonzero(pairs & ~(moved <= allowed) & ~(np.isnan(values) & np.isnan(then[nearest])))
     if far.size:
         worst = far[np.nan_to_num(moved[far], nan=np.inf).argmax()]
         lines.append(
             f"front moved at {far.size} of {pairs.sum()} bounds, most at {bound} = {at[worst]:g}: "
-            f"{name} {values[worst]:.8g} -> {then[near[worst]]:.8g}"
+            f"{name} {values[worst]:.8g} -> {then[nearest[worst]]:.8g}"
         )
     return lines, []
 

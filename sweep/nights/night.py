@@ -245,8 +245,8 @@ def _words(name: str, record: StudyRecord) -> str:
 def _verdict(record: NightRecord) -> str:
     """Return the last line of a night's log."""
     changed = [f"{name} ({entry.changed})" for name, entry in record.studies.items() if entry.changed]
-    late = [name for name, entry in record.studies.items() if entry.state in ("cut", "waiting")]
+    unfinished = [name for name, entry in record.studies.items() if entry.state in ("cut", "waiting")]
     failed = [name for name, entry in record.studies.items() if entry.state == "failed"]
-    parts = [("changed", changed), ("not ready", late), ("failed", failed)]
+    parts = [("changed", changed), ("not ready", unfinished), ("failed", failed)]
     words = "; ".join(f"{word}: {', '.join(names)}" for word, names in parts if names)
     return f"{words or record.quiet} (exit code {record.exit_code}, {record.seconds:.3g} s)"

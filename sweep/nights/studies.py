@@ -176,11 +176,11 @@ def notify(command: str, night: Path, code: int, text: str) -> str:
     """
     about = {"LINKSWEEP_NIGHT": str(night.resolve()), "LINKSWEEP_CODE": str(code)}
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             command, shell=True, input=text, text=True, check=False, timeout=COMMAND_SECONDS, capture_output=True,
             env=os.environ | about,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         return f"took longer than {COMMAND_SECONDS:g} s"
-    lines = done.stderr.strip().splitlines()
-    return f"ended with {done.returncode}{': ' + lines[-1] if lines else ''}" if done.returncode else ""
+    lines = process.stderr.strip().splitlines()
+    return f"ended with {process.returncode}{': ' + lines[-1] if lines else ''}" if process.returncode else ""

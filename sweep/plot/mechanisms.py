@@ -155,10 +155,10 @@ def _panels(
     """Draw curves over the crank angle from the lowest position, so that several designs can be compared."""
     if panels is None:
         figure = new_figure(WIDTH, 2.1 * -(-len(names) // 2) + 0.5)
-        every = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2)).ravel().tolist()
-        for axes in every[len(names) :]:
+        grid = np.atleast_1d(figure.subplots(-(-len(names) // 2), 2)).ravel().tolist()
+        for axes in grid[len(names) :]:
             axes.set_axis_off()
-        panels = every[: len(names)]
+        panels = grid[: len(names)]
     free = any(lowest(family.position, turn[family.position].to_numpy(float))[1] for _, turn in turns)
     for axes, name in zip(panels, names, strict=True):
         shown = quantity(name, family.pose_output[name].unit.replace("length", unit))

@@ -55,12 +55,12 @@ def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lam
         return known
     settings, question, target, key = _statement(study, Path(folder))
     side = files.beside(Path(folder))
-    done = explored(question, target, settings, side / PARTS / key, cores, tell)
-    proof = concluded(question, done, _best(side / files.OPTIMUM, question), settings.gap)
-    write(side / files.PROOF, question, done.leaves, proof, target, key)
+    tree = explored(question, target, settings, side / PARTS / key, cores, tell)
+    proof = concluded(question, tree, _best(side / files.OPTIMUM, question), settings.gap)
+    write(side / files.PROOF, question, tree.leaves, proof, target, key)
     if cores.stop:
         raise KeyboardInterrupt
-    files.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(done.seconds, 3)})
+    files.append_run(Path(folder), {"event": EVENT, "boxes": proof.boxes, "processor_seconds": round(tree.seconds, 3)})
     if not proof.cut_short:
         shutil.rmtree(side / PARTS, ignore_errors=True)
     return proof

@@ -267,8 +267,8 @@ def _unconfirmed(data: Dataset) -> tuple[str, ...]:
     best = data.optimum
     if best is None or best.get("ended") != DIFFERS:
         return _behind_the_front(data)
-    apart = f"{100.0 * float(best['gap']):.2g} %"
-    text = f"the search took values that are up to {apart} beside the true ones, which are shown: better may be near"
+    gap = f"{100.0 * float(best['gap']):.2g} %"
+    text = f"the search took values that are up to {gap} beside the true ones, which are shown: better may be near"
     return (text, *_behind_the_front(data))
 
 

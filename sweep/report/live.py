@@ -112,8 +112,8 @@ def limit_values(name: str, limits: tuple[Limit, ...]) -> list[float]:
         for value, outputs in ((limit.maximum, above), (limit.minimum, below)):
             if value is None or limit.output not in outputs:
                 continue
-            both = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
-            values += [value, -value] if both else [value]
+            two_sided = is_largest(limit.output, magnitude=True) and stem(name) != "pressure_angle"
+            values += [value, -value] if two_sided else [value]
     return values
 
 
@@ -313,21 +313,21 @@ def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
     stored = set(data.units) | set(study.want)
     limits = [limit.output for limit in study.limits if limit.output in study.want and not is_flag(limit.output)]
     dimensions = [limited(data, cell.name) for cell in cells][:DIMENSIONS]
-    there = {axis.name for axis in dimensions}  # a prescribed output of [locus] is a dimension
+    names = {axis.name for axis in dimensions}  # a prescribed output of [locus] is a dimension
     outputs = [name for name in dict.fromkeys([*objective, *second, *limits]) if name in stored and not is_flag(name)]
-    return [*dimensions, *[data.shown(name) for name in outputs if name not in there][:OUTPUTS]]
+    return [*dimensions, *[data.shown(name) for name in outputs if name not in names][:OUTPUTS]]
 
 
 def _lines(parts: Sequence[Path], names: list[str], objective: str | None, of: int) -> tuple[NDArray[np.int64], Array]:
     """Return numbers and values of the best designs, and of evenly spaced others, among ``of`` feasible designs."""
     step = max(1, -(-of // SPREAD))
-    seen = 0
+    rows_before = 0
     numbers, values = np.empty(0, np.int64), np.empty((0, len(names)))
     best_numbers, best_values = numbers, values
     for batch_numbers, table in _feasible(parts, names):
-        every = slice(-seen % step, None, step)
-        numbers, values = np.concatenate([numbers, batch_numbers[every]]), np.vstack([values, table[every]])
-        seen += batch_numbers.size
+        picked = slice(-rows_before % step, None, step)
+        numbers, values = np.concatenate([numbers, batch_numbers[picked]]), np.vstack([values, table[picked]])
+        rows_before += batch_numbers.size
         if objective is not None:
             best_numbers, best_values = np.concatenate([best_numbers, batch_numbers]), np.vstack([best_values, table])
             order = np.argsort(compared(objective, best_values[:, names.index(objective)]), kind="stable")[:BEST]

@@ -142,9 +142,9 @@ def _of_front(data: Dataset) -> list[Shown]:
     side = "at least" if pareto.at_least else "at most"
     shown = data.shown(pareto.output)
     rows = records(data.front[data.front["status"] == codes.OK])
-    chosen = sorted({round(k) for k in np.linspace(0, len(rows) - 1, min(OFFERED, len(rows)))})
-    names = [f"{shown.symbol} {side} {shown.show(float(rows[k]['bound']), 3)}" for k in chosen]
-    return [Shown(name, "front", _objective(data, rows[k]), rows[k]) for name, k in zip(names, chosen, strict=True)]
+    numbers = sorted({round(k) for k in np.linspace(0, len(rows) - 1, min(OFFERED, len(rows)))})
+    names = [f"{shown.symbol} {side} {shown.show(float(rows[k]['bound']), 3)}" for k in numbers]
+    return [Shown(name, "front", _objective(data, rows[k]), rows[k]) for name, k in zip(names, numbers, strict=True)]
 
 
 def _objective(data: Dataset, row: Row) -> str:

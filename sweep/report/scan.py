@@ -171,12 +171,12 @@ def scan(
             best, result.best_row = float(score[row]), {name: float(batch[name][row]) for name in names}
         if objective is not None and second is not None:
             other = sense * compared(second, batch[second])
-            both = ok & np.isfinite(other)
+            complete = ok & np.isfinite(other)
             points = np.column_stack([score, other])
-            points_so_far = np.vstack([result.front, points[both]])
+            points_so_far = np.vstack([result.front, points[complete]])
             result.front = points_so_far[non_dominated(*points_so_far.T)]
             sampled = points[offset::stride]
-            samples.append(sampled[both[offset::stride]])
+            samples.append(sampled[complete[offset::stride]])
     if samples:
         result.scatter = np.vstack(samples) * (1.0, sense)
         result.front = result.front * (1.0, sense)

@@ -83,23 +83,23 @@ def sewn(data: Dataset) -> Sewn | None:
     sentence += f" {window_sentence(*sewing.binding(study.family, design))}"
     windows = np.stack(sewing.window(study.family, design[None], stated), axis=-1)[0]
     rooms, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
-    kept = {name: room >= 0.0 for name, room in rooms.items()}
-    moments = tuple(name for name in kept if name not in ends)
-    every = np.logical_and.reduce(list(kept.values()))
+    meets = {name: room >= 0.0 for name, room in rooms.items()}
+    moments = tuple(name for name in meets if name not in ends)
+    meets_all = np.logical_and.reduce(list(meets.values()))
     rows = tuple(
         SpeedRow(
             f"{stated[k] / RPM:.6g}",
             f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
             _binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),
-            tuple(_percent(float(kept[name][:, at].mean())) for name in (*moments, *ends)),
-            _percent(float(every[:, at].mean())),
-            " to ".join(map(_percent, _interval(every[:, at]))),
+            tuple(_percent(float(meets[name][:, at].mean())) for name in (*moments, *ends)),
+            _percent(float(meets_all[:, at].mean())),
+            " to ".join(map(_percent, _interval(meets_all[:, at]))),
         )
         for k, at in enumerate(np.searchsorted(speeds, stated).tolist())
     )
-    low, high = np.array([_interval(one) for one in every.T]).T
-    of_ends = {end: kept[name].mean(axis=0) for end, name in sewing.ends.items()}
-    return Sewn(sentence, moments, rows, len(designs), speeds / RPM, every.mean(axis=0), low, high, of_ends)
+    low, high = np.array([_interval(one) for one in meets_all.T]).T
+    of_ends = {end: meets[name].mean(axis=0) for end, name in sewing.ends.items()}
+    return Sewn(sentence, moments, rows, len(designs), speeds / RPM, meets_all.mean(axis=0), low, high, of_ends)
 
 
 def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:

@@ -64,7 +64,7 @@ def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Pl
     other = drawn_parts(family, {**design, **changed})
     if len(other) != len(placed):
         return {}
-    near = NEAR * extent([stage.part for stage in placed])
+    tolerance = NEAR * extent([stage.part for stage in placed])
     ends: dict[str, Array] = {}
     for stage, changed_stage in zip(placed, other, strict=True):
         points, moved = _points(stage.part, pose), _points(changed_stage.part, pose)
@@ -75,7 +75,7 @@ def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Pl
                 continue
             size, after = (float(np.linalg.norm(at[p] - at[q])) for at in (points, moved))
             for name in lengths:
-                same = abs(size - abs(float(design[name]))) < near and abs(after - abs(changed[name])) < near
+                same = abs(size - abs(float(design[name]))) < tolerance and abs(after - abs(changed[name])) < tolerance
                 if same and name not in ends:
                     ends[name] = np.array([points[p], points[q]]) + stage.shift
     return ends

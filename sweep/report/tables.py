@@ -201,9 +201,9 @@ def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> li
             space = f"{', '.join(number(value * shown.factor) for value in listed[:-1])} or {shown.show(listed[-1])}"
         elif high > low:
             space = f"{number(low * shown.factor)} to {shown.show(high)}"
-            near = 1e-9 * (high - low)
+            tolerance = 1e-9 * (high - low)
             if p.name not in study.rescaled:
-                edge = "lower edge" if value - low <= near else "upper edge" if high - value <= near else ""
+                edge = "lower edge" if value - low <= tolerance else "upper edge" if high - value <= tolerance else ""
         space += ", then scaled" if p.name in study.rescaled else ""
         words = [
             f"{x:+g}".replace("-", "−") if p.choices and math.isfinite(x) else shown.show(x, digits)
@@ -234,8 +234,8 @@ def fates(data: Dataset, scanned: Scan) -> list[Fate]:
             rows += [Fate(code, words, count, 100.0 * count / total) for words, count in _by_limit(data)]
         else:
             rows.append(Fate(code, meaning(code), counts[code], 100.0 * counts[code] / total))
-    kept = counts.get(codes.OK, 0)
-    return [*rows, Fate(codes.OK, "within all limits", kept, 100.0 * kept / total)]
+    passed = counts.get(codes.OK, 0)
+    return [*rows, Fate(codes.OK, "within all limits", passed, 100.0 * passed / total)]
 
 
 def _by_limit(data: Dataset) -> list[tuple[str, int]]:

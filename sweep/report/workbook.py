@@ -46,15 +46,16 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
         raise InputError("path", target.name, "a file ending in .xlsx", "export")
     data = read_dataset(Path(folder))
     sheets = {"designs": _designs(data), "optimum": data.optima, "curves": data.curves}
-    kept = {name: frame for name, frame in sheets.items() if frame is not None}
-    written = {name: _headed(data, frame) for name, frame in kept.items()} | {"definitions": _definitions(data, kept)}
+    present = {name: frame for name, frame in sheets.items() if frame is not None}
+    tables = {name: _headed(data, frame) for name, frame in present.items()}
+    tables["definitions"] = _definitions(data, present)
     try:
         import openpyxl
     except ModuleNotFoundError as error:
         allowed = f"the package openpyxl: {extra('excel')}"
         raise InputError("format", "xlsx", allowed, "export") from error
     book = openpyxl.Workbook(write_only=True)
-    for name, frame in written.items():
+    for name, frame in tables.items():
         sheet = book.create_sheet(name)
         sheet.freeze_panes = "B2"
         for row in [list(frame), *frame.astype(object).where(frame.notna(), None).to_numpy().tolist()]:

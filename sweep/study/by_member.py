@@ -136,8 +136,8 @@ def _tables(
 def _by_member(entries: dict[str, Any], member: str) -> dict[str, Any]:
     """Move the dotted names of a member into a table of its own."""
     of_member = {key.removeprefix(f"{member}."): x for key, x in entries.items() if key.startswith(f"{member}.")}
-    others = {key: x for key, x in entries.items() if not key.startswith(f"{member}.")}
-    return others | ({member: of_member} if of_member else {})
+    shared = {key: x for key, x in entries.items() if not key.startswith(f"{member}.")}
+    return shared | ({member: of_member} if of_member else {})
 
 
 def _has(family: Family, name: str) -> bool:

@@ -45,9 +45,9 @@ class Faults:
 
     def value(self, key: Key, value: object, allowed: str) -> None:
         """Report a value that is not allowed."""
-        written = str(value).lower() if isinstance(value, bool) else shown(value)
-        written = written if len(written) <= _LONGEST_VALUE else written[: _LONGEST_VALUE - 3] + "..."
-        self._add(key, f"{spelled(key)} = {written}; allowed: {allowed}")
+        text = str(value).lower() if isinstance(value, bool) else shown(value)
+        text = text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+        self._add(key, f"{spelled(key)} = {text}; allowed: {allowed}")
 
     def missing(self, key: Key, needed: str, instead: str = "") -> None:
         """Report a missing key, unless it or the key ``instead`` was reported as misspelt."""

@@ -33,8 +33,8 @@ class ObjectiveSection(Section):
     @property
     def named(self) -> tuple[tuple[str, str], ...]:
         """Given keys and the outputs that they name."""
-        both = (("minimise", self.minimise), ("maximise", self.maximise))
-        return tuple((key, name) for key, name in both if name is not None)
+        goals = (("minimise", self.minimise), ("maximise", self.maximise))
+        return tuple((key, name) for key, name in goals if name is not None)
 
 
 def check_goal(section: ObjectiveSection, file: StudyFile) -> None:

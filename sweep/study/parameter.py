@@ -80,15 +80,15 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
 
 def _read_fixed(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> float | None:
     entry = read_section(FixedEntry, raw, key, faults)
-    written = _unit(p, entry.unit, raw, key, faults)
-    if entry.value is None or written is None:
+    unit = _unit(p, entry.unit, raw, key, faults)
+    if entry.value is None or unit is None:
         return None
-    return _checked(p, entry.value, entry.value * written[1], key, faults)
+    return _checked(p, entry.value, entry.value * unit[1], key, faults)
 
 
 def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> Axis | None:
     entry = read_section(ListEntry, raw, key, faults)
-    written = _unit(p, entry.unit, raw, key, faults)
+    unit = _unit(p, entry.unit, raw, key, faults)
     if entry.values is None:
         return None
     seen: set[float] = set()
@@ -97,9 +97,9 @@ def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -
         if value in seen:
             faults.value((*key, "values", k), value, "every value once")
         seen.add(value)
-    if written is None:
+    if unit is None:
         return None
-    return Axis.listed(p.name, entry.values, *written)
+    return Axis.listed(p.name, entry.values, *unit)
 
 
 def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, sampled: bool) -> Axis | None:
@@ -108,7 +108,7 @@ def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, 
         return None
     before = len(faults.lines)
     entry = read_section(RangeEntry, raw, key, faults)
-    written = _unit(p, entry.unit, raw, key, faults)
+    unit = _unit(p, entry.unit, raw, key, faults)
     low, high = entry.low, entry.high
     if sampled and "count" in raw:
         faults.value((*key, "count"), raw["count"], "no count beside design.sample, which draws from the range")
@@ -120,11 +120,11 @@ def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, 
             faults.value((*key, "from"), low, 'a positive number on a scale = "log"')
     if low is not None and high is not None and not low < high:
         faults.value((*key, "to"), high, f"a number greater than from = {low:g}")
-    if len(faults.lines) > before or low is None or high is None or written is None:
+    if len(faults.lines) > before or low is None or high is None or unit is None:
         return None
     if sampled:
-        return Axis.sampled(p.name, (low, high), *written, entry.scale)
-    return Axis.lattice(p.name, (low, high), entry.count or 1, *written, entry.scale)
+        return Axis.sampled(p.name, (low, high), *unit, entry.scale)
+    return Axis.lattice(p.name, (low, high), entry.count or 1, *unit, entry.scale)
 
 
 def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faults: Faults) -> tuple[str, float] | None:

@@ -94,9 +94,9 @@ class Sobol:
 
     def points(self, start: int, stop: int, which: Sequence[int] | None = None) -> Array:
         """Return points start to stop - 1, one row per dimension, restricted to the dimensions ``which`` if given."""
-        chosen = range(len(self._shift)) if which is None else which
-        out = np.empty((stop - start, len(chosen)))
-        self.fill(start, stop, chosen, [(0.0, 1.0)] * len(chosen), range(len(chosen)), out)
+        dimensions = range(len(self._shift)) if which is None else which
+        out = np.empty((stop - start, len(dimensions)))
+        self.fill(start, stop, dimensions, [(0.0, 1.0)] * len(dimensions), range(len(dimensions)), out)
         return out.T
 
     def fill(
@@ -108,16 +108,16 @@ class Sobol:
         ``out`` is (stop - start, P); ``columns`` names the column of each dimension of ``which``.
         """
         low, high = np.array(ends, np.float64).reshape(len(which), 2).T.copy()
-        chosen, places = np.array(which, np.int64), np.array(columns, np.int64)
-        sobol_points(start, stop, self._digits, chosen, low, high, places, out)
+        dimensions, places = np.array(which, np.int64), np.array(columns, np.int64)
+        sobol_points(start, stop, self._digits, dimensions, low, high, places, out)
 
     def at(self, index: NDArray[np.int64], which: Sequence[int] | None = None) -> Array:
         """Return the points of the given indices, in any order, with the same bits as `points`."""
         gray = index ^ (index >> 1)
         first, high = gray & (RUN - 1), gray >> TABLE_BITS
-        chosen = range(len(self._shift)) if which is None else which
-        out = np.empty((len(chosen), index.size))
-        for row, k in zip(out, chosen, strict=True):
+        dimensions = range(len(self._shift)) if which is None else which
+        out = np.empty((len(dimensions), index.size))
+        for row, k in zip(out, dimensions, strict=True):
             x = self._shift[k] ^ self._tables[k, 0, first]
             for part, table in enumerate(self._tables[k, 1:]):
                 x ^= table[(high >> (part * TABLE_BITS)) & (RUN - 1)]

@@ -156,10 +156,10 @@ def _minimax(system: Array, right: Array, weights: Array) -> Array:
 
     start = _least(system, right, weights)
     scale = float(np.abs(weights * (system @ start - right)).max()) or 1.0
-    rows, rest = system * weights[:, None], (right - system @ start) * weights / scale
+    rows, residual = system * weights[:, None], (right - system @ start) * weights / scale
     bound = -np.ones((len(rows), 1))
     above, below = np.hstack([rows, bound]), np.hstack([-rows, bound])
-    solution = linprog([0.0, 0.0, 0.0, 1.0], A_ub=np.vstack([above, below]), b_ub=np.concatenate([rest, -rest]),
+    solution = linprog([0.0, 0.0, 0.0, 1.0], A_ub=np.vstack([above, below]), b_ub=np.concatenate([residual, -residual]),
                     bounds=[(None, None)] * 3 + [(0.0, None)])  # fmt: skip
     if solution.status != 0 or solution.x is None:
         raise InputError("poses", solution.message, "a linear programme with a solution", "lift_chain")

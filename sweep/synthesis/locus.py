@@ -269,8 +269,8 @@ class OnLocus:
     @cached_property
     def made(self) -> tuple[str, ...]:
         """Parameters that follow: a, b, c and branch, of a slider-crank also e."""
-        given = self.way.parameter_names
-        return tuple(f"{name}{self.number}" for name in find_family(self.family).parameter_names if name not in given)
+        inputs = self.way.parameter_names
+        return tuple(f"{name}{self.number}" for name in find_family(self.family).parameter_names if name not in inputs)
 
     def allowed(self, name: str, values: Array) -> str | None:
         """Return the allowed range of a prescribed output if values [mm, rad] lie outside of it; otherwise None."""

@@ -173,8 +173,8 @@ def _fitted(
     variance = square / free if free > 0 else np.nan
     spread = np.sqrt(variance * ((directions[~weak].T / singular_values[~weak]) ** 2).sum(axis=1)) * start
     spread = np.where(undetermined, np.inf, spread)
-    half = float(student.ppf(0.5 + 0.5 * confidence, free)) * spread if free > 0 else np.full(len(names), np.inf)
-    columns = {"value": values, "standard_error": spread, "low": values - half, "high": values + half}
+    half_width = float(student.ppf(0.5 + 0.5 * confidence, free)) * spread if free > 0 else np.full(len(names), np.inf)
+    columns = {"value": values, "standard_error": spread, "low": values - half_width, "high": values + half_width}
     return ConstantsFit(
         pd.DataFrame(columns, index=pd.Index(names, name="constant")),
         float(np.sqrt(square / count)),

@@ -157,8 +157,8 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     # over each point of the edge at each angle; a hundredth of a turn aside the thread must be longer
     placed = np.stack([np.outer(cos, x) - np.outer(sin, y), np.outer(sin, x) + np.outer(cos, y)], axis=2)
     longer = _way(ends, placed.reshape(-1, 2))[0].reshape(count, count) - length[:, None]
-    apart = np.abs((np.arange(count) - np.arange(count)[:, None] + count // 2) % count - count // 2)
-    clear = np.where(apart * 100 >= count, longer, np.inf).min(axis=1)
+    separation = np.abs((np.arange(count) - np.arange(count)[:, None] + count // 2) % count - count // 2)
+    clear = np.where(separation * 100 >= count, longer, np.inf).min(axis=1)
     _refuse(clear < 0.0, phi, "an edge that touches the thread at one place alone")
     edge = pd.DataFrame({"phi": phi, "x": x, "y": y, "nx": nx, "ny": ny, "curvature": turning / along, "clear": clear})
     edge.attrs["units"] = {"phi": "rad", "nx": "1", "ny": "1", "curvature": "1/length"} | dict.fromkeys(

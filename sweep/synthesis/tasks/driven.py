@@ -189,8 +189,8 @@ class Task8(LocusTask):
         """Return the largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         turned = RSSR.values(designs, Angles.of(phi1[:, None] + window), "psi")[0] - psi1[:, None]
-        rest = np.full((len(designs), 2), [self.alpha2, float(self.branch)])
-        stage = np.column_stack([lengths, rest])
+        constants = np.full((len(designs), 2), [self.alpha2, float(self.branch)])
+        stage = np.column_stack([lengths, constants])
         (s,) = RSSP.values(stage, Angles.of(theta[:, None] + self.kappa * turned), "s")
         largest: Array = np.abs(s - s[:, [WINDOW // 2]]).max(axis=1)
         return largest

@@ -56,8 +56,8 @@ def through_positions(
     sa, ca = np.sin(alpha), np.cos(alpha)
     h = g * sa
     x2, y2 = turned(swing)
-    both = rho1 + rho2
-    a0, a1 = e * (x1 - x2) / both, -sa * (y1 - y2) / both
+    rho_sum = rho1 + rho2
+    a0, a1 = e * (x1 - x2) / rho_sum, -sa * (y1 - y2) / rho_sum
     moved = []
     for position in task.positions:
         x, y = turned(position.dpsi)
@@ -69,7 +69,7 @@ def through_positions(
         offset = moved[0][0] / moved[0][1] if free else np.full(len(phi1), f)
     offset = np.where(np.abs(offset) < 1e100, offset, np.nan)
     designs, psi1 = designs_on_locus(swing, phi0, phi1, e, offset, g, alpha)
-    scale = (0.5 * both) ** 2
+    scale = (0.5 * rho_sum) ** 2
     residuals = {f"position {k}": (p - offset * q) / scale for k, (p, q) in enumerate(moved, 1) if k > free}
     limits = {"pressure angle": pressure_limit(designs, task.max_pressure_angle)}
     for k, p in enumerate(task.positions, 1):

@@ -238,5 +238,5 @@ def turning(name: str) -> Unknown:
 
 def ranges(task: object, *names: str) -> list[Unknown]:
     """Return the unknowns with these names for which a task gives a range, ``name_range``."""
-    given = ((name, getattr(task, f"{name}_range")) for name in names)
-    return [Unknown(name, *ends) for name, ends in given if ends is not None]
+    pairs = ((name, getattr(task, f"{name}_range")) for name in names)
+    return [Unknown(name, *ends) for name, ends in pairs if ends is not None]
