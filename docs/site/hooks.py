@@ -102,7 +102,7 @@ def python_page() -> str:
 
 def families_page() -> str:
     """Return parameters and outputs of every family, from the register."""
-    from sweep.cli.families import capability_words, main_outputs, over
+    from sweep.cli.families import capability_words, domain_words, main_outputs
     from sweep.evaluation.summaries import output
     from sweep.families import NAMES, family
 
@@ -116,7 +116,7 @@ def families_page() -> str:
     pages = {path.stem for path in (ROOT / "docs").glob("*.md")}
     for name in NAMES:
         entry = family(name)
-        lines += [f"## {name}", "", f"{entry.title[0].upper()}{entry.title[1:]}, over: {over(entry)}.", ""]
+        lines += [f"## {name}", "", f"{entry.title[0].upper()}{entry.title[1:]}, over: {domain_words(entry)}.", ""]
         words = capability_words(entry)
         lines += [f"Can be asked for: {', '.join(words)}.", ""] if words else []
         lines += [f"Equations and frame: [{name}](../{name}.md).", ""] if name in pages else []
