@@ -42,9 +42,10 @@ from kernels.effects.link_loads import (
 )
 from kernels.jit import inline, kernel
 from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed, put_wrench, vector, velocity_at
-from kernels.types import Array, Status
+from kernels.types import EPS, Array, Status
 
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
+ROUNDING = 4.0 * EPS / 1e-12  # share of the largest load to which the change of a small one is compared at least
 PART = 7  # of a shaft or a guide the forces on both supports across the axis, then that along it; else the force
 
 
@@ -145,17 +146,20 @@ def _sum(answers: Array, loads: Array, total: Array) -> None:
 def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Array, steps: Array) -> int:
     """Iterate the loads (Q,) to convergence; return the passes, -1 without.  ``new``, ``steps`` are scratch."""
     last, least, stalled, part, passes, count = math.inf, math.inf, 0, steps[1], -1, 0
+    largest = 0.0
     for which in range(loads.shape[0]):
         loads[which], steps[0, which] = 0.0, 0.0
     while passes < 0 and stalled < STALLED and count < PASSES:
         count += 1
-        change, step, along, square, whole = 0.0, 0.0, 0.0, 0.0, 0.0
+        change, step, along, square, whole, rounding = 0.0, 0.0, 0.0, 0.0, 0.0, ROUNDING * largest
         for which in range(joints.shape[0]):
             _sum(parts[which], loads, part[:PART])
             new[which] = _sizes(joints[which], friction[which], part)[0]
             mu, before = friction[which, MU], steps[0, which]
             apart, size = new[which] - loads[which], max(new[which], loads[which])
-            steps[0, which] = apart
+            steps[0, which], largest = apart, max(largest, size)
+            # A load next to its zero cannot settle to its own size: its last digits are those of the other loads.
+            size = max(size, rounding)
             if mu > 0.0:
                 change = max(change, abs(apart) / size if size > 0.0 else 0.0)
                 step = max(step, mu * abs(apart))

@@ -248,3 +248,15 @@ def test_means_of_angles_that_jump_say_what_they_miss(target):
     for name in wanted:
         off = np.abs(got[name] - true[name])[sure]
         assert (off <= (got[error_of(name)] + true[error_of(name)])[sure]).all()
+
+
+def test_friction_settles_next_to_the_zero_of_a_load():
+    """The load of the key that holds the shaft passes through zero: its last digits are those of the other loads.
+
+    The poses there were JAMMED.  The least load had no value, or that of the nearest pose that settled, 2e-4 N.
+    """
+    full, _, designs = frictional("cylindrical_looper_friction", 46)
+    got = found(full, designs[[7, 19, 45]], ("min_force_hold_friction",), 1e-8)
+    assert (got["status"] == st.OK).all()
+    assert (got["min_force_hold_friction"] <= got["err_min_force_hold_friction"]).all()
+    assert (got["err_min_force_hold_friction"] < 1e-6).all()
