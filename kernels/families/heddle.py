@@ -70,8 +70,8 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 
 @inline
 def _alike(one: float, other: float) -> bool:
-    """Whether two lengths are equal but for rounding: else it would turn a parallelogram at its dead points."""
-    return abs(one - other) <= 8.0 * EPS * abs(one)
+    """Whether two finite lengths are equal but for rounding, which would turn a parallelogram at its dead points."""
+    return abs(one - other) < 8.0 * EPS * abs(one)
 
 
 @inline

@@ -304,7 +304,7 @@ def test_full_disk_ends_with_74_and_nothing_half_written(
 
 
 def test_bug_in_a_worker_surfaces_with_its_chunk(study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(study: Study, start: int, stop: int, should_stop: object) -> ChunkResult:
+    def broken(study: Study, start: int, stop: int, *_: object) -> ChunkResult:
         raise ZeroDivisionError("broken")
 
     monkeypatch.setattr("sweep.engine.worker.compute_chunk", broken)
