@@ -69,9 +69,13 @@ def four_bar(a: Any, b: Any, c: Any, e: Any, side: float) -> FourBar:
 
 
 @inline
-def _alike(one: float, other: float) -> bool:
-    """Whether two finite lengths are equal but for rounding, which would turn a parallelogram at its dead points."""
-    return abs(one - other) < 8.0 * EPS * abs(one)
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two finite lengths are equal but for rounding, which would turn a parallelogram at its dead points.
+
+    A complex step in one of them is no rounding: the linkage is solved, so that its gradient is that of the length.
+    """
+    apart = one - other
+    return one == other or (abs(apart.real) < 8.0 * EPS * abs(one.real) and apart.imag == 0.0)
 
 
 @inline
@@ -88,7 +92,7 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     )
     heddle, slide = designs[i, 10] * per_unit, designs[i, 11] * per_unit
     side_f, side_c = designs[i, 12].real, designs[i, 13].real
-    parallel = _alike(designs[i, 6].real, designs[i, 7].real) and _alike(designs[i, 8].real, designs[i, 9].real)
+    parallel = _alike(designs[i, 6], designs[i, 7]) and _alike(designs[i, 8], designs[i, 9])
     first = four_bar(a, b, c, e, side_c)
     # A parallelogram is not solved; unit lengths keep its constants finite.
     one = 1.0 + 0.0 * a

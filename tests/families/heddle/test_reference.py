@@ -268,3 +268,18 @@ def test_heddle_rounded_parallelogram_stays_one_beyond_its_dead_points():
     for name in names:
         assert got[name] == plain[name]
         assert got[f"err_{name}"] <= 1e-7 * (plain.max_y - plain.min_y)
+
+
+@pytest.mark.parametrize("name", ["O3D", "O4F", "O3O4", "DF"])
+def test_gradient_of_a_parallelogram_by_one_length_is_that_of_the_linkage(name):
+    """A complex step in one length of a parallelogram was lost where the linkage counted as one all the same."""
+    arms = dict.fromkeys(("O3D", "O4F"), 90.0) | dict.fromkeys(("O3O4", "DF"), 260.0)
+    lengths = {"O2B": 40.0, "BC": 150.0, "O3C": 60.0, "O2O3": 160.0, "O4E": 85.0, "chi_mid": 1.5} | arms
+    angles, k, step = np.linspace(0.9, 1.5, 5), FIELDS.index(name), 1e-4
+    shifted = np.tile(design(**lengths), (3, 1)).astype(np.complex128)
+    shifted[:, k] += np.array([step, -step, 1e-20j])
+    got = moved(shifted, np.tile(angles, (3, 1)), np.complex128)["y"]
+    by_differences = (got[0] - got[1]).real / (2.0 * step)
+    assert np.abs(by_differences).min() > 1e-3
+    # central differences of a smooth function: the square of step/length, and rounding over the step
+    np.testing.assert_allclose(got[2].imag / 1e-20, by_differences, rtol=1e-7, atol=1e-8)
