@@ -75,7 +75,8 @@ def _alike(one: Any, other: Any) -> bool:
     A complex step in one of them is no rounding: the linkage is solved, so that its gradient is that of the length.
     """
     apart = one - other
-    return one == other or (abs(apart.real) < 8.0 * EPS * abs(one.real) and apart.imag == 0.0)
+    alike: bool = one == other or (abs(apart.real) < 8.0 * EPS * abs(one.real) and apart.imag == 0.0)
+    return alike
 
 
 @inline
