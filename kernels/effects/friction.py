@@ -31,9 +31,10 @@ from kernels.effects.kinetostatics import (
 )
 from kernels.jit import inline, kernel
 from kernels.linkage.joints import Joints, read
-from kernels.types import Array, Status
+from kernels.types import EPS, Array, Status
 
 TOLERANCE = 1e-14
+ROUNDING = 4.0 * EPS / 1e-12  # share of the largest load to which the change of a small one is compared at least
 PASSES = 5000  # a pose that nearly jams converges slowly
 STALLED = 5
 LEAP = 10  # passes after which the rest of the geometric series is added at once (Aitken)
@@ -318,10 +319,13 @@ def leap(along: float, square: float, size: float) -> float:
 
 @inline
 def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
-    """Largest relative change of a couple."""
-    worst = 0.0
+    """Largest relative change of a couple.
+
+    A couple next to its zero cannot settle to its own size: its last digits are those of the other loads.
+    """
+    worst, rounding = 0.0, ROUNDING * max(abs(x), max(abs(y), abs(z)))
     for old, change in ((x, dx), (y, dy), (z, dz)):
-        size = max(abs(old), abs(old + change))
+        size = max(max(abs(old), abs(old + change)), rounding)
         if size > 0.0:
             worst = max(worst, abs(change) / size)
     return worst

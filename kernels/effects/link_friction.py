@@ -17,7 +17,17 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, sub
-from kernels.effects.friction import LEAP, PASSES, STALLED, STILL, TOLERANCE, leap, support_forces, unit_vector
+from kernels.effects.friction import (
+    LEAP,
+    PASSES,
+    ROUNDING,
+    STALLED,
+    STILL,
+    TOLERANCE,
+    leap,
+    support_forces,
+    unit_vector,
+)
 from kernels.effects.link_loads import (
     CONTACT,
     FREEDOM,
@@ -42,10 +52,9 @@ from kernels.effects.link_loads import (
 )
 from kernels.jit import inline, kernel
 from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed, put_wrench, vector, velocity_at
-from kernels.types import EPS, Array, Status
+from kernels.types import Array, Status
 
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
-ROUNDING = 4.0 * EPS / 1e-12  # share of the largest load to which the change of a small one is compared at least
 PART = 7  # of a shaft or a guide the forces on both supports across the axis, then that along it; else the force
 
 

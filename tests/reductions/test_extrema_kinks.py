@@ -260,3 +260,17 @@ def test_friction_settles_next_to_the_zero_of_a_load():
     assert (got["status"] == st.OK).all()
     assert (got["min_force_hold_friction"] <= got["err_min_force_hold_friction"]).all()
     assert (got["err_min_force_hold_friction"] < 1e-6).all()
+
+
+def test_friction_settles_next_to_the_zero_of_the_load_of_a_slide():
+    """Poses there were JAMMED: of every second of these designs the least load was up to 0.02 N, its error 1e-8 N."""
+    random, n = np.random.default_rng(3), 24
+    crank = {"a": 20.0 * random.uniform(0.8, 1.2, n), "b": 90.0 * random.uniform(0.8, 1.2, n), "m_crank": 2e-4}
+    bodies = {"m_coupler": 1e-4, "com_coupler_x": 45.0, "m_slider": 3e-4, "speed": 520.0}
+    supports = {"support_a1": -30.0, "support_a2": -60.0, "support_d1": -20.0, "support_d2": 30.0}
+    rubs = {"mu_a": 0.05, "mu_b": 0.1, "mu_c": 0.0, "mu_d": 0.15, "radius_a": 8.0, "radius_b": 5.0, "radius_c": 5.0}
+    table = crank | bodies | supports | rubs | {"load_force": random.uniform(-100.0, 100.0, n)}
+    found = sweep.summarise("slider_crank", table, ["min_force_d_friction"], accuracy=1e-8)
+    assert (found.status == st.OK).all()
+    assert (found.min_force_d_friction <= found.err_min_force_d_friction).all()
+    assert (found.err_min_force_d_friction < 1e-5).all()
