@@ -17,7 +17,7 @@ from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, put
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"
-# Relative accuracy of the smallest discriminants: their sign is what matters.
+# Relative accuracy of the smallest discriminants unless a finer one is asked for: their sign is what matters.
 TARGET = 1e-10
 FEW = 16  # number of poses that identify most non-rotatable designs
 
@@ -112,7 +112,7 @@ def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Sta
 def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accuracy, looked: int) -> Columns:
     own = own_step(family, suffix, accuracy)
     if own is None:
-        return _from_poses(family, designs, suffix, looked)
+        return _from_poses(family, designs, suffix, looked, min(TARGET, accuracy.target or TARGET))
     step, stage = own
     found = step.run(stage.designs(designs), frozenset(NAMES), accuracy)
     columns: Columns = {f"{name}{suffix}": found[name] for name in NAMES}
@@ -123,7 +123,7 @@ def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accurac
     return columns | {"status": found["status"]}
 
 
-def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Columns:
+def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target: float) -> Columns:
     """Compute the margin from the family's discriminant, refined unless ``looked`` poses are enough."""
     designs, _ = near_unit_size(family, designs)  # no discriminant overflows
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
@@ -132,7 +132,7 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int) -> Col
     exactly = not looked or fused.curve_of(family, request, anywhere=True) is not None
     least = Extremum.unknown(len(designs)) if exactly else _apart(family, designs, discriminant, looked)
     turning, unknown = np.flatnonzero(np.isnan(least.value)), np.zeros(len(designs), np.uint8)
-    found, unknown[turning] = true_extrema(family, designs[turning], [request], TARGET, anywhere=True)
+    found, unknown[turning] = true_extrema(family, designs[turning], [request], target, anywhere=True)
     put(least, turning, found[request])
     known = np.isfinite(least.value)
     phi = np.where(known, least.phi, 0.0)[:, None]
