@@ -147,14 +147,16 @@ def _left_out(study: Study) -> list[str]:
 
 def _computed(study: Study) -> list[str]:
     """Return the routes of the sweep in their order, with cost, outputs and limits."""
-    limits = {
-        limit.output: bound_words(limit, quantity(limit.output, output(study.family, limit.output).unit))
-        for limit in study.output_limits
-    }
+    limits: dict[str, list[str]] = {}  # [cyclogram] and [limits] may bound the same output
+    for limit in study.output_limits:
+        shown = quantity(limit.output, output(study.family, limit.output).unit)
+        limits.setdefault(limit.output, []).append(bound_words(limit, shown))
     selected, rows = ordered_routes(study), list[tuple[str, str, str]]()
     lines = ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
     for k, route in enumerate(selected, 1):
-        outputs = ", ".join(name + (f" ({limits[name]})" if name in limits else "") for name in route.outputs)
+        outputs = ", ".join(
+            name + (f" ({' and '.join(limits[name])})" if name in limits else "") for name in route.outputs
+        )
         rows.append((f"{k}. {route.name}", f"{duration(1e-9 * route.ns_per_design)} per design", outputs))
     return [*lines, *aligned(rows)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -176,7 +176,8 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
     datasets = [chunk_files.required_parts(folder, "compare") for folder in (old, new)]
     folders, chunks = (datasets[0][0], datasets[1][0]), [parts for _, parts in datasets]
     names = [_columns(parts) for parts in chunks]
-    result = Comparison(slower=slower, notes=_notes(*folders), seconds=_seconds(*folders))
+    plans = [files.trusted_plan(folder) or {} for folder in folders]
+    result = Comparison(slower=slower, notes=_notes(folders, plans), seconds=_seconds(*folders))
     result.columns_only_old = tuple(name for name in names[0] if name not in names[1])
     result.columns_only_new = tuple(name for name in names[1] if name not in names[0])
     shared = [name for name in names[0] if name in names[1] and name not in ("design", "status")]
@@ -185,6 +186,7 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
     streams = [_rows(parts, columns, stops) for parts, columns in zip(chunks, names, strict=True)]
     for before, after in zip(*streams, strict=True):
         _look(result, before, after, rtol)
+    result.notes += _other_designs(result, plans)
     _compare_optima(result, *folders, rtol)
     return result
 
@@ -256,11 +258,20 @@ def _in_words(status: Any) -> str:
     return f"{status} ({meaning(status)})"
 
 
-def _notes(old: Path, new: Path) -> tuple[str, ...]:
-    plans = [files.trusted_plan(folder) or {} for folder in (old, new)]
+def _other_designs(result: Comparison, plans: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Say of two studies whose rows of one number are different designs what that means for the changes."""
+    parameters = {c["name"] for plan in plans for c in plan.get("columns", ()) if c["role"] == "parameter"}
+    other = [name for name, moved in result.moved.items() if name in parameters and moved.changed]
+    if not other or plans[0].get("study") == plans[1].get("study"):
+        return ()
+    words = "rows are compared by their numbers, and with these the two studies number different designs"
+    return (f"the designs differ in {', '.join(other)}: {words}, so changed values do not concern one mechanism",)
+
+
+def _notes(folders: Sequence[Path], plans: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     notes = [
         f"{folder}: not complete"
-        for folder, plan in zip((old, new), plans, strict=True)
+        for folder, plan in zip(folders, plans, strict=True)
         if not plan.get("complete") or chunk_files.missing_chunks(folder, chunk_files.parts(folder))
     ]
     if plans[0].get("study") != plans[1].get("study"):

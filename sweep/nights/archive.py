@@ -34,7 +34,8 @@ class StudyRecord:
     "failed" with the exit code of the run in ``code``.  ``linked`` chunks come from the night ``linked_from``,
     ``computed`` ones are new.  ``seconds`` is the time of the run, None if nothing had to be computed.  ``figures`` are
     the headline figures, with their ``units``.  ``changes`` describes in words the changes since the night
-    ``compared_with``, ``changed`` is 0, 10, 11 or 12, and ``moved`` names the changed figures.
+    ``compared_with``, ``changed`` is 0, 10, 11 or 12, and ``moved`` names the changed figures;
+    ``edited`` says that the study file was edited, which is then the only change.
     """
 
     state: State
@@ -49,6 +50,7 @@ class StudyRecord:
     changed: int = 0
     changes: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
+    edited: bool = False
     report: bool = False
     message: str = ""
 

@@ -36,11 +36,12 @@ DESIGNS, WITHIN, YIELD = "designs", "designs within all limits", "yield"
 
 @dataclass(frozen=True)
 class Changes:
-    """Changes between two nights: exit code of ``sweep compare``, words, and the changed headline figures."""
+    """Changes between two nights: exit code of ``sweep compare``, words, changed figures, an edited study."""
 
     code: int
     lines: tuple[str, ...]
     moved: tuple[str, ...] = ()
+    edited: bool = False
 
 
 def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str]]:
@@ -82,7 +83,8 @@ def changes(study: Study, old: Path, new: Path) -> Changes:
     plans = [files.read_plan(folder) or {} for folder in (old, new)]
     if plans[0].get("study") != plans[1].get("study"):
         words = differences(plans[0].get("data") or {}, plans[1].get("data") or {})
-        return Changes(ROWS_CHANGED, (f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}",))
+        edit = f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}"
+        return Changes(ROWS_CHANGED, (edit,), edited=True)
     rtol = study.accuracy.target or ROUNDING[study.output.dtype]
     comparison = compare(old, new, rtol)
     # The optimum and the reference have tolerances of their own.

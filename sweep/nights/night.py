@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -187,7 +187,7 @@ class _Night:
             difference = changes(study, base / study.name / files.DESIGNS, designs)
         if not carried.chunks:
             late = slower(study.name, ended.seconds, self.history)
-            difference = Changes(difference.code or late.code, (*difference.lines, *late.lines), difference.moved)
+            difference = replace(difference, code=difference.code or late.code, lines=(*difference.lines, *late.lines))
         return StudyRecord(
             "complete",
             linked_from=carried.night,
@@ -200,6 +200,7 @@ class _Night:
             changed=difference.code,
             changes=difference.lines,
             moved=difference.moved,
+            edited=difference.edited,
             report=reported,
             message="; ".join(filter(None, [cut, "" if reported else f"no report: {message}"])),
         )

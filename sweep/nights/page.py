@@ -113,6 +113,8 @@ def _state(record: StudyRecord) -> str:
         return f"failed ({record.code})"
     if record.state != "complete":
         return "cut off" if record.state == "cut" else "not begun"
+    if record.edited:
+        return "study file edited"
     words = {0: "no change", 10: "values changed", 11: "rows changed", 12: "slower"}
     return "first night" if record.compared_with is None else words[record.changed]
 

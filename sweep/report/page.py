@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from kernels import status as codes
 from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
-from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, located, replacing, unwritable, write_atomically
+from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, located, replacing, unwritable
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.jobs.progress import Say, unsaid
@@ -124,7 +124,8 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             **as_made,
             **live(data, cells, several),
         )
-        write_atomically(out / "report.html", text.encode())
+        with replacing(out / "report.html") as partial:
+            partial.write_bytes(text.encode())
         say("report", STEPS, STEPS, "steps")
     return out / "report.html"
 
@@ -291,7 +292,8 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     )
     with unwritable(f"report {out}"):
         out.mkdir(parents=True, exist_ok=True)
-    write_atomically(out / COMPARISON, text.encode())
+    with replacing(out / COMPARISON) as partial:
+        partial.write_bytes(text.encode())
     return out / COMPARISON
 
 

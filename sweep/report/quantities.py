@@ -191,7 +191,7 @@ def number(value: float, digits: int = 5) -> str:
         text = f"{value:.{decimals}f}"
         text = text.rstrip("0").rstrip(".") if "." in text else text
     else:
-        mantissa, exponent = f"{value:.{max(digits - 3, 0)}e}".split("e")
+        mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         mantissa = mantissa.rstrip("0").rstrip(".") if "." in mantissa else mantissa
         power = str(int(exponent)).replace("-", "−").translate(SUPERSCRIPTS)
         text = f"{mantissa}·10{power}"

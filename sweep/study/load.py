@@ -59,11 +59,11 @@ def load_study(path: str | Path, smoke: bool = False) -> Study:
     beside = file.with_name("smoke.toml")
     if smoke and not beside.exists():
         needed = "a file beside study.toml with the keys that its tiny version changes, docs/study-files.md"
-        raise StudyError(str(beside), [f"smoke.toml is missing; needed: {needed}"])
+        raise StudyError(str(beside), [f"{beside} is missing; needed: {needed}"])
     files = [file, beside] if smoke else [file]
-    read = {f.name: read_toml(f) for f in files}
-    places = {f.name: key_lines(toml_text(f)) for f in files}
-    data = merged(read[file.name], read[beside.name]) if smoke else read[file.name]
+    read = {str(f): read_toml(f) for f in files}
+    places = {str(f): key_lines(toml_text(f)) for f in files}
+    data = merged(read[str(file)], read[str(beside)]) if smoke else read[str(file)]
     return _build(data, file, read, places)
 
 
@@ -75,7 +75,7 @@ def study_from_data(data: Mapping[str, Any], path: str | Path) -> Study:
     StudyError
         as :func:`load_study`.
     """
-    return _build(data, Path(path), {Path(path).name: data})
+    return _build(data, Path(path), {str(path): data})
 
 
 def study_of(plan: Mapping[str, Any], path: Path) -> Study:

@@ -83,7 +83,7 @@ def load_task(path: str | Path) -> SynthesisTask:
     file = Path(path)
     file = file / "study.toml" if file.is_dir() else file
     data = read_toml(file)
-    faults = Faults({file.name: data}, {file.name: key_lines(toml_text(file))})
+    faults = Faults({str(file): data}, {str(file): key_lines(toml_text(file))})
     if not {"mechanism", "machine"} & set(data):  # the other tables of a study are checked by the study
         for name in data:
             if name not in ("task", "study"):

@@ -80,7 +80,7 @@ def toml_text(file: Path) -> str:
 
 def _fault(file: Path, text: str) -> StudyError:
     line = _LINE.search(text)
-    place = f"{file.name}:{line[1]}" if line else file.name
+    place = f"{file}:{line[1]}" if line else str(file)
     return StudyError(str(file), [f"{place}: {re.sub('^line [0-9]+: ', '', text)}"])
 
 

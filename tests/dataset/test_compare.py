@@ -169,6 +169,16 @@ def test_other_code_another_study_and_an_unfinished_one_are_said(study: Study, d
     assert f"{other}: not complete" in text and "the studies differ" in text and "different versions" in text
 
 
+def test_rows_of_two_studies_that_are_other_designs_are_said(study: Study, dataset: Path, tmp_path: Path) -> None:
+    rows = sweep.load(dataset)
+    same, other = (written(study, rows.assign(a=rows["a"] * by), tmp_path / f"by{by}") for by in (1.0, 1.5))
+    assert "designs differ" not in "\n".join(sweep.compare(dataset, other).lines())  # of one study: values changed
+    for folder in (same, other):
+        files.write_plan(folder, (files.read_plan(folder) or {}) | {"study": "y"})
+    assert "designs differ" not in "\n".join(sweep.compare(dataset, same).lines())
+    assert any("the designs differ in a: rows are" in line for line in sweep.compare(dataset, other).lines())
+
+
 def test_a_damaged_chunk_is_refused(study: Study, dataset: Path, tmp_path: Path) -> None:
     other = written(study, sweep.load(dataset), tmp_path / "new")
     part = sorted(other.glob("part-*"))[1]

@@ -165,6 +165,11 @@ def test_the_command_lists_and_explains():
     assert "did you mean 'friction'?" in wrong.output
 
 
+def test_the_index_of_the_page_says_what_every_effect_of_a_group_is():
+    (row,) = [line for line in page().splitlines() if line.startswith("| [sliding_bearings, rolling_bearings,")]
+    assert "sliding bearings of the rocker; rolling bearings of the rocker; utilisation of the sliding" in row
+
+
 def test_the_page_names_every_output_and_input_once_for_all_effects_that_share_it():
     """Names in one row share their stem; reductions of outputs per pose are not listed."""
     named = set()

@@ -131,6 +131,12 @@ def test_windows_and_settings_of_a_study_are_limits(tmp_path):
     assert limits["a_back_height"] == (-1.0, 1.0)  # the study's own, not the machine's 0.2
 
 
+def test_plan_tells_a_limit_of_the_cyclogram_and_another_on_the_same_output(tmp_path):
+    text = STUDY.replace("[cyclogram]", "[limits.looper]\nswing = '<= 55 deg'\n\n[cyclogram]")
+    plan = CliRunner().invoke(main, ["check", str(written(tmp_path, text))]).output
+    assert "looper.swing (40 to 60° and at most 55°)" in plan
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

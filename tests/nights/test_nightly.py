@@ -251,7 +251,7 @@ def test_an_edited_study_is_said_with_its_edit(tmp_path: Path) -> None:
     old = sweep.run(written(tmp_path / "one"), tmp_path / "old" / "designs", jobs=1)
     path = written(tmp_path / "one", e=91)
     found = changes(load_study(path), old, sweep.run(path, tmp_path / "new" / "designs", jobs=1))
-    assert found.code == 11
+    assert found.code == 11 and found.edited
     assert "the study itself was edited: design.e 90 mm -> 91 mm" in found.lines
 
 

@@ -32,6 +32,14 @@ def test_the_moved_figure_is_red_at_its_night_only(tmp_path: Path) -> None:
     assert (last.trends[0].red, last.red, last.state, last.words) == (True, True, "values changed", ("swing moved",))
 
 
+def test_an_edited_study_is_not_called_one_whose_rows_changed(tmp_path: Path) -> None:
+    for name, own in (("edited", record(1.0, changed=11, edited=True)), ("moved", record(1.0, changed=11))):
+        append_history(tmp_path / name, night(1, own, code=11))
+    edited, moved = (write_page(tmp_path / name).read_text() for name in ("edited", "moved"))
+    assert "study file edited" in edited and "rows changed" not in edited
+    assert "study file edited" not in moved and "rows changed" in moved
+
+
 def test_a_report_that_was_deleted_is_not_linked(tmp_path: Path) -> None:
     nights = [night(1, record(1.0, report=True)), night(2, record(1.0, report=True))]
     assert study_rows("needle", nights, tmp_path).report is None

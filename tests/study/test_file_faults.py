@@ -67,7 +67,8 @@ def test_a_fault_is_told_of_the_file_it_stands_in(tmp_path: Path) -> None:
         load_study(tmp_path, smoke=True)
     places = [" ".join(fault.split()[:2]).rstrip(":") for fault in caught.value.faults]
     line = RIGHT.count("\n", 0, RIGHT.index("starts = 10")) + 1
-    assert places == [f"study.toml:{line}: optimise.starts", "smoke.toml:3: design.h", "smoke.toml:2: design.c.count"]
+    expected = [f"study.toml:{line}: optimise.starts", "smoke.toml:3: design.h", "smoke.toml:2: design.c.count"]
+    assert places == [f"{tmp_path}/{place}" for place in expected]
 
 
 def test_a_fault_under_a_name_of_the_users_is_told_by_the_key_above_it() -> None:

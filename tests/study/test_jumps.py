@@ -82,7 +82,7 @@ def test_count_limits_a_sweep_alone(tmp_path) -> None:
 def test_bound_that_the_optimiser_cannot_follow_is_told_with_its_line(tmp_path, limit, allowed) -> None:
     """What it follows of 100 degrees, -cos^2, is that of 80: such a bound was held as one of 80, or divided by zero."""
     text = STUDY.replace('swing = ">= 20 deg"', limit)
-    with pytest.raises(StudyError, match=f"1 fault\n  study.toml:17: limits.{limit.split()[0]} = .*{allowed}"):
+    with pytest.raises(StudyError, match=f"1 fault\n  .*/study.toml:17: limits.{limit.split()[0]} = .*{allowed}"):
         study_of(tmp_path, text)
     study = study_of(tmp_path, text.replace("[optimise]\nstarts = 1\n", ""))
     with pytest.raises(InputError, match=allowed):

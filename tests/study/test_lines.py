@@ -127,8 +127,8 @@ def test_faults_name_file_and_line_and_a_missing_key_that_of_its_table(tmp_path)
     with pytest.raises(StudyError) as caught:
         load_study(tmp_path)
     faults = sorted(caught.value.faults)
-    assert [fault.split(": ")[0] for fault in faults] == ["study.toml:10", "study.toml:11", "study.toml:8"]
-    assert faults[0].startswith("study.toml:10: design.a is missing")
+    assert [fault.split(": ")[0] for fault in faults] == [f"{tmp_path}/study.toml:{line}" for line in (10, 11, 8)]
+    assert faults[0].startswith(f"{tmp_path}/study.toml:10: design.a is missing")
 
 
 def test_faults_of_a_member_name_the_line_in_its_table(tmp_path):
@@ -139,8 +139,8 @@ def test_faults_of_a_member_name_the_line_in_its_table(tmp_path):
     with pytest.raises(StudyError) as caught:
         load_study(tmp_path)
     assert {fault.split(" = ")[0] for fault in caught.value.faults} == {
-        "study.toml:9: design.needle.b",
-        "study.toml:12: design.needle.offset",
+        f"{tmp_path}/study.toml:9: design.needle.b",
+        f"{tmp_path}/study.toml:12: design.needle.offset",
     }
 
 

@@ -18,7 +18,7 @@ def said(text: str, folder: Path) -> str:
     (fault,) = caught.value.faults
     place, _, words = fault.partition(": ")
     line = re.search(r"line (\d+)", words)
-    assert line is None or place == f"study.toml:{line[1]}"  # where an editor jumps to
+    assert line is None or place == f"{folder}/study.toml:{line[1]}"  # where an editor jumps to
     return words
 
 
