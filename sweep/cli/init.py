@@ -52,7 +52,7 @@ def init(
     name: str, family: str | None, members: tuple[str, ...], points: Path | None, unit: str, cyclogram: Path | None,
     into: Path,
 ) -> None:  # fmt: skip
-    """Write a first study of a mechanism or a machine: NAME/study.toml, every line explained, and its tiny version.
+    """Write a first study of a mechanism or a machine: NAME/study.toml, with comments, and its tiny version.
 
     It holds the example of the family, or of every --member, with two dimensions swept, passes `sweep check` and runs
     as it is.  With --points it holds the design of a drawing instead, which is its reference.  Its first line names the

@@ -61,7 +61,7 @@ def as_rod(body: str, own: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
     name = f"rod_{body}"
     others = tuple((name, p.name) for p in own if not p.name.startswith("m_"))
     text = f"1: the mass of the {body} is that of a slender rod between its joints, centre halfway, inertia m l^2/12"
-    words = f"{text}; 0 where its centre or inertia is given, else"
+    words = f"{text}; left out, it is 0 where its centre or inertia is given, else 1"
     line = f"mass per length of the {body} between its joints, beside m_{body}; counts where rod_{body} is 1"
     thick = f"radius of gyration of the section of the {body} about a line across it; 0: slender, no inertia along it"
     return (

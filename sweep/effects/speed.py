@@ -60,8 +60,9 @@ SETTLED = 1e-7  # share of the largest torque excess or loss by which the last p
 
 def _outputs(suffix: str, text: str) -> tuple[Output, ...]:
     """Speed and angular acceleration of the crank over the turn."""
+    steady = f"speed of the crank in the steady state of constant mean speed{text}"
     return (
-        Output(f"crank_speed{suffix}", "rad/s", f"speed of the crank in the steady state{text}", EQUATION),
+        Output(f"crank_speed{suffix}", "rad/s", steady, EQUATION),
         Output(f"crank_acceleration{suffix}", "rad/s^2", f"its angular acceleration{text}", EQUATION),
     )
 
@@ -284,7 +285,7 @@ def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None
     """Make the entry for mechanisms with the load effect ``loaded`` and, if given, the friction of ``rubbing``."""
     rubs = rubbing is not None
     suffix, text = SUFFIX[rubs], FRICTION_TEXT if rubs else ""
-    curves = _outputs(suffix, f" of constant mean speed{text}")
+    curves = _outputs(suffix, text)
     results = (*_numbers(suffix, text), *reduction_outputs(curves))
     return replace(
         loaded,
