@@ -36,7 +36,7 @@ class LiftChain(NamedTuple):
 
 
 def rack_angles(table: Table, phi: Sequence[float] | Array, height: Sequence[float] | Array, side: int = 1) -> Array:
-    """Return the angles of the rack at which the tooth has the wanted heights; (18) of docs/feed.md.
+    """Return the angles of the rack at which the tooth has the wanted heights; docs/feed.md.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def lift_chain(
     weights: Sequence[float] | Array | None = None,
     norm: Norm = "squares",
 ) -> LiftChain:
-    """Return the joint F and coupler q that guide the rack best through wanted angles; (10), (19) of docs/feed.md.
+    """Return the joint F and coupler q that guide the rack best through wanted angles; (10) of docs/feed.md.
 
     The weighted difference |F - E|^2 - q^2 is linear in fx, fy and q^2 - fx^2 - fy^2, so no initial guess is needed.
 
