@@ -15,11 +15,12 @@ from kernels import status as st
 from kernels.types import Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, about, crossed
+from sweep.numerics.records import put
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
 from sweep.reductions.resolution import series_of
-from sweep.reductions.sampling import Extremum, Mask, blocks, put
+from sweep.reductions.sampling import Extremum, Mask, blocks
 from sweep.reductions.window import Window
 
 OVER = 1e-6  # distance of a limit position from the angle's branch cut [rad] that counts as beyond it

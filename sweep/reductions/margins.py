@@ -9,11 +9,12 @@ from kernels.types import TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step
 from sweep.families.capabilities import Assembly
 from sweep.families.names import is_flag
+from sweep.numerics.records import put
 from sweep.quantities.dimensions import near_unit_size
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
 from sweep.reductions.extrema import true_extrema
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, put, turn
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, turn
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"

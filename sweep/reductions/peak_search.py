@@ -11,7 +11,9 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, about, switches
+from sweep.numerics.records import joined, only, put
 from sweep.numerics.singularities import Singularities
+from sweep.numerics.ties import first_of_equals
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
@@ -33,11 +35,8 @@ from sweep.reductions.sampling import (
     Mask,
     continued,
     discriminants,
-    joined,
     jumps,
-    only,
     pose_columns,
-    put,
     sample_turn,
 )
 from sweep.reductions.window import Window, edges
@@ -339,8 +338,8 @@ class Search:
         moved[has] = np.abs(peaks.height[chosen] - peaks.guess[chosen])
         if located:
             alike = refine.VARIES * (off[row] + 4.0 * EPS * np.abs(peaks.height))
-            known = peaks._replace(err_height=np.maximum(peaks.err_height, alike))
-            chosen = refine.first_of_equals(row, known, chosen)
+            err_height = np.maximum(peaks.err_height, alike)
+            chosen = first_of_equals(row, peaks.phi, peaks.err_phi, peaks.height, err_height, chosen)
         phi, err_phi = peaks.phi[chosen], peaks.err_phi[chosen]
         slope = self.family.derivative_of.get(request.pose)
         if located and slope is not None and not request.windowed:

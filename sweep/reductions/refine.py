@@ -8,9 +8,10 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.curves import samples as scan
-from kernels.types import EPS, TWO_PI
+from kernels.types import EPS
 from sweep.families.base import Array, Family
-from sweep.reductions.sampling import Index, only, pose_columns, put
+from sweep.numerics.records import only, put
+from sweep.reductions.sampling import Index, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: values (k, m), times their signs, of candidates (k,) at the angles phi (k, m)."""
@@ -30,7 +31,6 @@ RIPPLE = 0.25  # error per fourth difference, which is eight times the noise of 
 BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences relative to the largest, of first and of later samples
 LEARNT = 0.8  # largest share of the previous error that a narrower window about a kink leaves
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # steps of the last windows relative to the samples' spacing
-NEIGHBOURS = TWO_PI / 64.0  # largest distance of maxima of neighbouring pieces [rad]
 VARIES = 8.0  # ratio of the rounding at neighbouring poses to that at one pose, at most
 
 
@@ -191,69 +191,6 @@ def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
 def reaching(height: Array, peaks: Peaks) -> Peaks:
     """Set the heights of peaks, and add the changes to their errors."""
     return peaks._replace(height=height, err_height=peaks.err_height + np.abs(height - peaks.height))
-
-
-def first_of_equals(row: Index, peaks: Peaks, chosen: Index) -> Index:
-    """Return the first of equally high peaks in the turn, for the highest peaks ``chosen`` of some rows.
-
-    A symmetric motion has equally high maxima: rounding would choose another one at every accuracy.
-
-    Parameters
-    ----------
-    row : (k,) of the peaks;  chosen : numbers of the highest peaks, one of a row
-    """
-    return _first(row, peaks.phi, peaks.err_phi, peaks.height, peaks.err_height, chosen)
-
-
-def _first(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> Index:
-    best = _of_row(row, chosen)
-    known = 2.0 * np.minimum(err, err[best])
-    # A place closer to the end of the turn than its error counts as just after its beginning.
-    place = np.mod(phi, TWO_PI)
-    place = np.where(place + err_phi < TWO_PI, place, err_phi)
-    late = np.where(height >= height[best] - known, -place, -np.inf)
-    first = np.full(row.max(initial=0) + 1, -1)
-    scan.best_candidate(row, late, np.full(first.size, -np.inf), first)
-    found: Index = first[row[chosen]]
-    return found
-
-
-def _of_row(row: Index, chosen: Index) -> Index:
-    """Chosen peak of each peak's row."""
-    found = np.full(row.max(initial=0) + 1, chosen[0] if chosen.size else 0)
-    found[row[chosen]] = chosen
-    return found[row]
-
-
-def hill(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> tuple[Array, Array]:
-    """Find the places of the highest maxima ``chosen`` of some rows, and their errors.
-
-    A maximum at the end of a piece of the curve may lie a little beyond it, and that of a dwell anywhere on it: the
-    error of the place spans all maxima that may be as high, without a gap of more than `NEIGHBOURS`.  Of several such
-    hills the first of the turn counts, as in `first_of_equals`.
-    """
-    first = _first(row, phi, err_phi, height, err, chosen)
-    rival = np.flatnonzero(height + 2.0 * err >= height[_of_row(row, chosen)])
-    rival = rival[np.lexsort((phi[rival], row[rival]))]
-    gap = np.diff(phi[rival]) - err_phi[rival[:-1]] - err_phi[rival[1:]]  # a level piece is as high at its other end
-    apart = (np.diff(row[rival]) != 0) | (gap > NEIGHBOURS)
-    number = np.zeros(row.size, np.int64)
-    number[rival[1:]] = np.cumsum(apart)
-    # Peaks on both sides of the angle 0 belong to one hill: the last one of a row precedes its first one.
-    head = rival[np.flatnonzero(np.diff(row[rival], prepend=-1))]
-    tail = rival[np.flatnonzero(np.diff(row[rival], append=-1))]
-    seam = phi[head] - err_phi[head] + TWO_PI - phi[tail] - err_phi[tail]
-    around = (seam <= NEIGHBOURS) & (number[head] != number[tail])
-    same = np.arange(row.size)
-    same[number[tail[around]]] = number[head[around]]
-    phi, number = phi - TWO_PI * (same[number] != number), same[number]
-    low, high, top = np.full(row.size, np.inf), np.full(row.size, -np.inf), np.full(row.size, -1)
-    np.minimum.at(low, number[rival], (phi - err_phi)[rival])
-    np.maximum.at(high, number[rival], (phi + err_phi)[rival])
-    scan.best_candidate(number[rival], height[rival], np.full(row.size, -np.inf), top)
-    mine = number[first]
-    place = phi[rival[top[mine]]]
-    return place, np.maximum(place - low[mine], high[mine] - place)
 
 
 def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Array]:

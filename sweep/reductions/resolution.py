@@ -20,9 +20,10 @@ from sweep.families import curve_features as features
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import Bends, SingularCurve
 from sweep.numerics.events import near_zeros, sign_changes, with_events
+from sweep.numerics.records import put
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
 from sweep.quantities.kinds import Request
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, put, sample_turn
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, sample_turn
 
 PER_WAVE = 2.0  # waves per turn that the least number of samples resolves
 SHARES = 16.0  # the least number of samples is enough for switches at a distance of a turn over this

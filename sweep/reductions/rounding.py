@@ -11,10 +11,11 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
+from sweep.numerics.records import only
 from sweep.numerics.singularities import Singularities, crowded
 from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
 from sweep.reductions.resolution import nearest
-from sweep.reductions.sampling import Index, Mask, blocks, only, pose_columns
+from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
 
 TRIES = 3
 PLACES = 32  # a force along what bears none is exactly 0 at five of six poses

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
+from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -140,25 +140,6 @@ def _poses(poses: PoseFunction, domain: Interval, designs: Array, angles: Angles
     place = _place(low, high, angles.cos)
     still = np.zeros_like(place)
     return poses(designs, Angles(np.ascontiguousarray(place), still, still), wanted)
-
-
-Record = TypeVar("Record", bound=tuple[Any, ...])
-
-
-def only(record: Record, which: Index | Mask) -> Record:
-    """Select rows of a named tuple of columns by index or mask."""
-    return type(record)(*(column[which] for column in record))
-
-
-def joined(*records: Record) -> Record:
-    """Concatenate the rows of named tuples of columns."""
-    return type(records[0])(*(np.concatenate(columns) for columns in zip(*records, strict=True)))
-
-
-def put(record: tuple[Any, ...], rows: Index | Mask, values: tuple[Any, ...]) -> None:
-    """Write rows of a named tuple of columns, in place."""
-    for column, part in zip(record, values, strict=True):
-        column[rows] = part
 
 
 class Extremum(NamedTuple):

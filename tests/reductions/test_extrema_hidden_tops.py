@@ -9,9 +9,9 @@ from numpy.polynomial import chebyshev
 import sweep
 from kernels import status as st
 from sweep.families.names import error_of
+from sweep.numerics import panel_search
 from sweep.numerics.chebyshev import NODES, basis, product, summits
-from sweep.reductions import panels
-from sweep.reductions.panels import Panels
+from sweep.numerics.panel_search import Panels
 
 TURN = 2.0 * np.pi
 ROUNDING = 1e-12  # of a value: two ways to one pose
@@ -142,7 +142,7 @@ def test_the_tip_of_a_tent_anywhere_on_a_panel_is_within_what_the_panel_may_reac
     series = product(values, basis()[1].T)
     none = np.zeros(tips.size)
     held = Panels(none.astype(np.intp), none - 1.0, none + 1.0, series, values.max(axis=1), none, none)
-    assert (panels._upper(held, 1) >= -1e-12).all()
+    assert (panel_search._upper(held, 1) >= -1e-12).all()
 
 
 @pytest.mark.parametrize("mode", [0, 1, -1])

@@ -94,11 +94,11 @@ def test_an_extremum_does_not_depend_on_what_is_wanted_beside_it():
 
 
 def made(curve) -> Family:
-    """A mechanism whose one output is a given curve with kinks; its design shifts it along the turn."""
+    """A mechanism whose one output is a given curve with kinks, JAMMED where it is nan; its design shifts it."""
 
     def poses(designs, angles, wanted):
         values = np.asarray(curve(np.mod(angles.phi - designs[:, :1], 2.0 * np.pi)), np.float64)
-        return {"y": values, "status": np.zeros(values.shape, np.uint8)}
+        return {"y": values, "status": np.where(np.isnan(values), st.JAMMED, st.OK).astype(np.uint8)}
 
     output = Output("y", "1", "a curve", kinks=True)
     return Family(
@@ -164,6 +164,24 @@ def test_the_place_of_a_top_errs_by_no_more_than_it_says(curve, target):
     """Tops next to the end of a panel among them: 40 of one curve, shifted along the turn."""
     _, _, away, err_phi, _ = placed(curve, 1, target)
     assert (np.abs(away - 2.0) <= err_phi).all()
+
+
+def test_a_jam_between_the_first_poses_is_called_a_jam():
+    """The status said that an input was invalid."""
+    with np.errstate(invalid="ignore"):
+        *_, status = searched(lambda x: np.where(np.abs(x - 2.0) < 1e-4, np.nan, -np.abs(x - 2.0)), 1)
+    assert (status == st.JAMMED).all()
+
+
+@pytest.mark.parametrize("target", [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10])
+def test_of_two_zeros_the_first_counts_at_any_target(target):
+    """One that happened to be met more closely was taken: their errors may differ by orders of magnitude."""
+    request = Request("y", -1, place=True)
+    curve = made(lambda x: np.abs(np.sin(x) * (1.0 + 0.3 * np.cos(x + 1.0))))
+    answers, status = panels.extrema(curve, SHIFTS, [request], target, False)
+    first = np.mod(SHIFTS[:, 0], np.pi)
+    assert (status == st.OK).all()
+    assert (np.abs(answers[request].phi - first) <= answers[request].err_phi).all()
 
 
 def test_the_place_of_a_dwell_errs_by_as_much_as_the_dwell_is_long():

@@ -7,7 +7,7 @@ import pytest
 
 import sweep
 from kernels import status as st
-from sweep.reductions.refine import hill
+from sweep.numerics.ties import hill
 
 # A slider-crank a thousand times as long as its offsets: the force on the slider has three valleys, two of them a
 # millionth as high as its largest value, the lower one with sides so steep that little is known of its bottom.
@@ -34,5 +34,5 @@ def test_a_top_a_hair_before_the_end_of_the_turn_is_its_beginning_behind_one_tha
     """Panels on both sides of angle 0 have one top twice: a distance of head208 was least at 2 pi - 1e-11."""
     end, err = 2.0 * np.pi - 1e-11, np.full(3, 1.1e-11)
     for phi, expected in (([2.8e-12, end, 1.0], 2.8e-12), ([1.0, 2.0, end], end), ([1.0, 2.0, end - 1e-9], 1.0)):
-        place, _ = hill(np.zeros(3, np.int64), np.array(phi), err, np.ones(3), err, np.array([1]))
+        place, _ = hill(np.zeros(3, np.int64), np.array(phi), err, np.ones(3), err, np.array([1]), np.zeros(3))
         assert place[0] == expected

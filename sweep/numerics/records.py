@@ -1,0 +1,28 @@
+"""Rows of named tuples of columns."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sweep.numerics.quadrature import Index
+
+Record = TypeVar("Record", bound=tuple[Any, ...])
+
+
+def only(record: Record, which: Index | NDArray[np.bool_]) -> Record:
+    """Select rows of a named tuple of columns by index or mask."""
+    return type(record)(*(column[which] for column in record))
+
+
+def joined(*records: Record) -> Record:
+    """Concatenate the rows of named tuples of columns."""
+    return type(records[0])(*(np.concatenate(columns) for columns in zip(*records, strict=True)))
+
+
+def put(record: tuple[Any, ...], rows: Index | NDArray[np.bool_], values: tuple[Any, ...]) -> None:
+    """Write rows of a named tuple of columns, in place."""
+    for column, part in zip(record, values, strict=True):
+        column[rows] = part
