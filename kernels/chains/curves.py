@@ -22,50 +22,68 @@ AHEAD = 1e-5  # [rad] of the difference quotient for the fifth derivative, which
 
 
 @dataclass(frozen=True)
-class Curve:
-    """Closures of a curve; k: constants of a design, (a, b, c): coefficients, (u, v): cosine and sine of the crank.
+class Sampling:
+    """Closures that sample one curve, or two of one motion together; k: constants of a design, (a, b, c): coefficients.
 
     Samples are taken in two loops, one up to the last stage and one for the last stage: the loops are half as long, and
     the processor overlaps two rounds of each, which hides that a root waits for a root.
 
     Parameters
     ----------
-    name : for the functions that are generated from the curve
+    name : for the functions that are generated from it
+    curves : number of curves, 1 or 2
     guarded : number of stages behind the first whose discriminant must be positive
     ends : whether the last stage is one of them
-    samples : least number of samples per distance of the nearest singularity
-    drive : (k, u, v) -> `Input` of the last stage, discriminants of the stages before
-    jet : (k, a, b, c, u, v) -> the curve and its first two derivatives
-    sample : (k, a, b, c, input) -> the curve, and the discriminant of the last stage
+    density : least number of samples per distance of the nearest singularity
+    drive : (k, u, v) -> `Input` of the last stage, discriminants of the stages before; (u, v): cosine and sine of the
+        crank
+    sample : (k, a, b, c, input) -> tuple of the curves, and the discriminant of the last stage
     hand, take : (rows, i, input) and (rows, i) -> input: write and read the input of a sample at place i of five rows
-    rounding : (k, a, b, u, v) -> estimate of the curve's rounding error
     """
 
     name: str
+    curves: int
     guarded: int
     ends: bool
-    samples: float
+    density: float
     drive: Helper
-    jet: Helper
     sample: Helper
     hand: Helper
     take: Helper
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A curve whose extrema are searched.
+
+    Parameters
+    ----------
+    alone : its samples
+    jet : (k, a, b, c, u, v) -> the curve and its first two derivatives
+    rounding : (k, a, b, u, v) -> estimate of the curve's rounding error
+    """
+
+    alone: Sampling
+    jet: Helper
     rounding: Helper
 
 
-def curve(chain: Chained, order: int, along: bool) -> Curve:
-    """Make the curve that is the derivative of ``order`` 0 to 3, or the `MARGIN`; with ``along`` every b is 0."""
-    kind = "margin" if order == MARGIN else f"{'along' if along else 'order'}{order}"
+def sampling(chain: Chained, orders: tuple[int, ...], along: bool) -> Sampling:
+    """Make the samples of derivatives of these orders 0 to 3, or of the `MARGIN`; with ``along`` every b is 0."""
+    highest, margin = max(orders), orders == (MARGIN,)
+    kind = "margin" if margin else f"{'along' if along else 'order'}{''.join(map(str, orders))}"
     name = f"{kind}_{chain.record.name}"
-    jet, sample, rounding = (
-        _margin(chain) if order == MARGIN else _derivative(chain, order, _along if along else _in_frame)
-    )
-    hand, take = _handing(max(order, 0))
-    jet, sample, hand, take, rounding = (
-        generated_inline(f"{f.__name__}_{name}", f) for f in (jet, sample, hand, take, rounding)
-    )
-    guarded, samples = chain.stages - (2 if order == MARGIN else 1), 18.0 if order == JERK else 12.0
-    return Curve(name, guarded, order != MARGIN, samples, chain.drive, jet, sample, hand, take, rounding)
+    sample = _squared_cosine(chain) if margin else _derivatives(chain, orders, _along if along else _in_frame)
+    made = (generated_inline(f"{f.__name__}_{name}", f) for f in (sample, *_handing(max(highest, 0))))
+    guarded, density = chain.stages - (2 if margin else 1), 18.0 if highest == JERK else 12.0
+    return Sampling(name, len(orders), guarded, not margin, density, chain.drive, *made)
+
+
+def curve(chain: Chained, order: int, along: bool) -> Curve:
+    """Make the curve that is the derivative of ``order``, or the `MARGIN`, as `sampling` does."""
+    alone = sampling(chain, (order,), along)
+    made = _margin(chain) if order == MARGIN else _derivative(chain, order, _along if along else _in_frame)
+    return Curve(alone, *(generated_inline(f"{f.__name__}_{alone.name}", f) for f in made))
 
 
 def _handing(order: int) -> tuple[Helper, Helper]:
@@ -109,8 +127,24 @@ def _along(a: Any, b: Any, x: Any, y: Any) -> Any:
     return a * x  # so the compiler drops the computation of y
 
 
-def _derivative(chain: Chained, order: int, made: Helper) -> tuple[Helper, Helper, Helper]:
-    travel, land, blur = chain.travel, chain.land, chain.blur
+def _derivatives(chain: Chained, orders: tuple[int, ...], made: Helper) -> Helper:
+    land, first, last = chain.land, orders[0], orders[-1]
+    plus = _plus if first == 0 else _first
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        return (plus(made(a, b, m[first], m[Y0 + first]), c),), m.delta
+
+    def sample_two(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        m = land(k, t)
+        value = plus(made(a, b, m[first], m[Y0 + first]), c)
+        return (value, made(a, b, m[last], m[Y0 + last])), m.delta
+
+    return sample if len(orders) == 1 else sample_two
+
+
+def _derivative(chain: Chained, order: int, made: Helper) -> tuple[Helper, Helper]:
+    travel, blur = chain.travel, chain.blur
     x, y = order, Y0 + order  # places in `Travel`
     e, f = order, JERK + 1 + order  # places among the rounding errors
     plus = _plus if order == 0 else _first
@@ -125,29 +159,31 @@ def _derivative(chain: Chained, order: int, made: Helper) -> tuple[Helper, Helpe
         slope = made(a, b, m.x4, m.y4)
         return made(a, b, m.x3, m.y3), slope, (made(a, b, n.x4, n.y4) - slope) / AHEAD
 
-    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
-        m = land(k, t)
-        return plus(made(a, b, m[x], m[y]), c), m.delta
-
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         errors = blur(k, u, v)
         return abs(a) * errors[e] + abs(b) * errors[f]
 
-    return (jerk_jet if order == JERK else jet), sample, rounding
+    return (jerk_jet if order == JERK else jet), rounding
 
 
-def _margin(chain: Chained) -> tuple[Helper, Helper, Helper]:
+def _squared_cosine(chain: Chained) -> Helper:
+    dip = chain.dip
+
+    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
+        y, _, _ = dip(k, t)
+        return (y,), y
+
+    return sample
+
+
+def _margin(chain: Chained) -> tuple[Helper, Helper]:
     drive, dip, blur = chain.drive, chain.dip, chain.blur
 
     def jet(k: Any, a: Any, b: Any, c: Any, u: Any, v: Any) -> Any:
         t, _ = drive(k, u, v)
         return dip(k, t)
 
-    def sample(k: Any, a: Any, b: Any, c: Any, t: Any) -> Any:
-        y, _, _ = dip(k, t)
-        return y, y
-
     def rounding(k: Any, a: Any, b: Any, u: Any, v: Any) -> Any:
         return blur(k, u, v)[8]
 
-    return jet, sample, rounding
+    return jet, rounding

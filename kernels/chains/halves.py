@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from kernels.chains.curves import Curve
+from kernels.chains.curves import Sampling
 from kernels.chains.form import Helper
 from kernels.jit import generated_inline, inline
 from kernels.types import Array
@@ -29,24 +29,53 @@ def handed_rows(memory: Array, begin: int, end: int) -> Rows:
     )  # fmt: skip
 
 
-def keepers(curve: Curve) -> tuple[Helper, Helper, Helper]:
+@inline
+def _row_of_one(values: Array, gap: int, begin: int, end: int) -> Rows:
+    return (values[begin:end],)
+
+
+@inline
+def _write_one(rows: Rows, i: int, y: Any) -> None:
+    rows[0][i] = y[0]
+
+
+@inline
+def _rows_of_two(values: Array, gap: int, begin: int, end: int) -> Rows:
+    return values[begin:end], values[gap + begin : gap + end]
+
+
+@inline
+def _write_two(rows: Rows, i: int, y: Any) -> None:
+    rows[0][i], rows[1][i] = y
+
+
+def writers(of: Sampling) -> tuple[Helper, Helper]:
+    """Choose the functions that store samples.
+
+    ``rows(values, gap, begin, end)`` gives the places begin, ..., end - 1 of each curve's samples, which are ``gap``
+    apart; ``write(rows, i, y)`` writes the curves to place i.
+    """
+    return (_row_of_one, _write_one) if of.curves == 1 else (_rows_of_two, _write_two)
+
+
+def keepers(of: Sampling) -> tuple[Helper, Helper, Helper]:
     """Make the functions that store the discriminants of the stages which a curve needs to be positive.
 
     ``rows(guards, gap, begin, end)`` gives the places begin, ..., end - 1 of each stage's row, the rows ``gap`` apart;
     ``keep(rows, deltas, i)`` writes the discriminants of the stages before the last to place i, and
     ``keep_last(rows, delta, i)`` the discriminant of the last.
     """
-    rows, keep, last = _no_rows, _keep_none, curve.guarded if curve.ends else 0
-    for stage in range(1, curve.guarded + 1):
-        rows = _one_more_row(rows, stage, curve.name)
-        keep = keep if stage == last else _one_more_kept(keep, stage, curve.name)
+    rows, keep, last = _no_rows, _keep_none, of.guarded if of.ends else 0
+    for stage in range(1, of.guarded + 1):
+        rows = _one_more_row(rows, stage, of.name)
+        keep = keep if stage == last else _one_more_kept(keep, stage, of.name)
 
     # Written out stage by stage: a loop over the stages keeps the loop over the samples from vectorising.
     def keep_last(here: Rows, delta: Any, i: int) -> None:
         if last > 0:
             here[last][i] = delta
 
-    return rows, keep, generated_inline(f"keep_last_{curve.name}", keep_last)
+    return rows, keep, generated_inline(f"keep_last_{of.name}", keep_last)
 
 
 @inline

@@ -8,17 +8,18 @@ of one number.  Designs that need more samples are sampled one by one in :mod:`k
 from __future__ import annotations
 
 from kernels.arithmetic.intrinsics import largest, smallest
-from kernels.chains.curves import Curve
+from kernels.chains.curves import Sampling
 from kernels.chains.form import BLOCK, Helper
-from kernels.chains.halves import TOGETHER, handed_rows, keepers
-from kernels.chains.look import FEWEST, FLAT, ROUGH, SHARE, Counts, fourth_difference, zero_beside
+from kernels.chains.halves import TOGETHER, handed_rows, keepers, writers
+from kernels.chains.look import FEWEST, FLAT, ROUGH, SHARE, Counts, Scratch, fourth_difference, zero_beside
 from kernels.chains.peaks import CONSTANTS, A, B, C
 from kernels.jit import generated_inline, inline
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin
 
-# Rows of BLOCK numbers: results of the samples, then the least discriminant of each later stage.
-SCALE_AT, ROUGHNESS, CLOSE, _MOST, _LEAST, _FLOOR, MARKS, _MARKS_TOO, LOW = (k * BLOCK for k in range(9))
+# Rows of BLOCK numbers: results of the samples of a curve; those of the discriminants, the least of each later stage.
+SCALE_AT, ROUGHNESS, _MOST, _LEAST, _FLOOR, MARKS, _MARKS_TOO, SAID = (k * BLOCK for k in range(8))
+CLOSE, LOW = 0, BLOCK
 RESOLVED, UNRESOLVED, FLAT_CURVE = 0.0, 1.0, 2.0  # values of ROUGHNESS
 ANGLES = TOGETHER // BLOCK  # crank angles per round of both loops
 AT_ONCE = 4  # samples per round, so that a row is fetched less often
@@ -99,13 +100,13 @@ def _peak_bit(before: float, y: float, after: float, up: float, down: float, flo
 
 
 @inline
-def _dip(count: int, guards: Array, said: Array, slot: int, enough: float) -> None:
+def _dip(count: int, guards: Array, low_at: Array, slot: int, enough: float) -> None:
     """Write the least discriminant of a stage, and 1 where its nearest complex zero may be too near for the samples.
 
     That is nearer than ``enough``, a squared distance [samples] as of :func:`kernels.chains.look.zero_beside`, which is
     tested here without a division.
     """
-    low, near, row = _row(said, LOW // BLOCK + slot), _row(said, CLOSE // BLOCK), slot * (FEWEST + 2)
+    low, near, row = _row(low_at, LOW // BLOCK + slot), _row(low_at, CLOSE // BLOCK), slot * (FEWEST + 2)
     for i in range(count):
         low[i] = 1e300
     for j in range(0, FEWEST, AT_ONCE):
@@ -137,22 +138,21 @@ def nearest_dip(guards: Array, slot: int, lane: int) -> float:
     return nearest
 
 
-def first_looker(curve: Curve, get: Helper) -> Helper:
-    """Make the function ``look(count, m, table, modes, values, guards, said, handed)`` of a curve.
+def first_looker(of: Sampling, get: Helper) -> Helper:
+    """Make the function ``look(count, m, table, modes, room)``.
 
-    It samples the designs whose constants stand at the places 0 ... count - 1 of the list m, and writes the rows
-    SCALE_AT, ROUGHNESS, CLOSE, MARKS (one of each mode) and LOW of ``said``.  The samples stand in the rows 2 ... 33 of
-    ``values``, the discriminants in the rows 1 ... 32 of each later stage in ``guards``.
+    It samples the designs whose constants stand at the places 0 ... count - 1 of the list m, and writes of each curve
+    the rows SCALE_AT, ROUGHNESS and MARKS (one of each mode) of ``room.said``, and the rows CLOSE and LOW of
+    ``room.low``.  The samples stand in the rows 2 ... 33 of each curve in ``room.abreast``, the discriminants in the
+    rows 1 ... 32 of each later stage in ``room.dips``.
     """
-    guarded, drive, sample, hand, take = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
-    guard_rows, keep, keep_last = keepers(curve)
+    curves, guarded, drive, sample, hand, take = of.curves, of.guarded, of.drive, of.sample, of.hand, of.take
+    (guard_rows, keep, keep_last), (value_rows, write) = keepers(of), writers(of)
     # A little more than needed: where the test holds the exact distance is computed afterwards.
-    enough = (1.0 + 1e-6) * (curve.samples / TURN) ** 2
+    enough = (1.0 + 1e-6) * (of.density / TURN) ** 2
 
-    def look(
-        count: int, m: Array, table: CosSin, modes: Counts, values: Array, guards: Array, said: Array, handed: Array
-    ) -> None:
-        cos, sin = table
+    def look(count: int, m: Array, table: CosSin, modes: Counts, room: Scratch) -> None:
+        (cos, sin), values, guards, handed = table, room.abreast, room.dips, room.handed
         for start in range(0, FEWEST, ANGLES):
             for j in range(ANGLES):
                 u, v, rows = cos[start + j], sin[start + j], handed_rows(handed, j * BLOCK, (j + 1) * BLOCK)
@@ -162,21 +162,25 @@ def first_looker(curve: Curve, get: Helper) -> Helper:
                     hand(rows, i, t)
                     keep(low, deltas, i)
             for j in range(ANGLES):
-                here, rows = _row(values, start + j + 2), handed_rows(handed, j * BLOCK, (j + 1) * BLOCK)
+                here = value_rows(values, SAMPLES, (start + j + 2) * BLOCK, (start + j + 3) * BLOCK)
+                rows = handed_rows(handed, j * BLOCK, (j + 1) * BLOCK)
                 low = guard_rows(guards, DIPS, (start + j + 1) * BLOCK, (start + j + 2) * BLOCK)
                 for i in range(count):
                     y, delta = sample(get(m, i + CONSTANTS), m[i + A], m[i + B], m[i + C], take(rows, i))
-                    here[i] = y
+                    write(here, i, y)
                     keep_last(low, delta, i)
-        _close(count, values, 0, 2)
-        near = _row(said, CLOSE // BLOCK)
+        near = _row(room.low, CLOSE // BLOCK)
         for i in range(count):
             near[i] = 0.0
         for slot in range(guarded):
             _close(count, guards, slot * (FEWEST + 2), 1)
-            _dip(count, guards, said, slot, enough)
-        _spread(count, values, said, modes[0])
-        for which in range(modes.size):
-            _mark(count, values, said, which, modes[which])
+            _dip(count, guards, room.low, slot, enough)
+        for c in range(curves):
+            own, said = values[c * SAMPLES : (c + 1) * SAMPLES], room.said[c * SAID : (c + 1) * SAID]
+            _close(count, own, 0, 2)
+            _spread(count, own, said, modes[c])
+            # Of two curves each has one mode.
+            for which in range(c, c + 1 if curves > 1 else modes.size):
+                _mark(count, own, said, which - c, modes[which])
 
-    return generated_inline(f"look_abreast_{curve.name}", look)
+    return generated_inline(f"look_abreast_{of.name}", look)

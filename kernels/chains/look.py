@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.intrinsics import largest, smallest
-from kernels.chains.curves import Curve
+from kernels.chains.curves import Sampling
 from kernels.chains.form import Helper
-from kernels.chains.halves import TOGETHER, handed_rows, keepers
+from kernels.chains.halves import TOGETHER, handed_rows, keepers, writers
 from kernels.jit import generated_inline, inline
 from kernels.types import TWO_PI, Array, CosSin
 
@@ -31,7 +31,7 @@ AT_ONCE = 8.0  # factor of the number of samples at most: the first look sees a 
 SHARE = 0.6  # a peak below this share of the best sample is not refined
 ROUGH = 0.5  # fourth difference over the size of the curve; at a pole a twelfth of a turn of samples away it is 0.6
 FLAT = 1e-9  # a curve that varies by less of its size is left to the slower search
-GUARD_ROW = MOST + 2
+VALUES, GUARD_ROW = MOST + 8, MOST + 2  # numbers of one design: samples of a curve, discriminants of a stage
 
 
 def sampling_tables() -> CosSin:
@@ -95,56 +95,43 @@ def samples_for(per_distance: float, n: int, nearest: float, needed: int) -> int
 class Scratch(NamedTuple):
     """Memory of the search.
 
-    ``values``: samples, ``guards``, ``dips``: discriminants of one design and of a block, ``said``: results of the
-    first look, ``block``: designs column by column, ``handed``: inputs of the last stage, ``place``: place of each
-    design in the list, ``needed``: its number of samples, ``span``: places of the local maxima of each mode and design
-    in the list: the first, and begin and end of the rest.
+    ``values``, ``abreast``: samples of each curve of one design and of a block, ``guards``, ``dips``: discriminants of
+    one design and of a block, ``said``, ``low``: results of the first look about each curve and about discriminants,
+    ``block``: designs column by column, ``handed``: inputs of the last stage, ``near``: distance of each design's
+    nearest singularity [rad], 0 for a design that is left out, ``place``: its place in the list, ``needed``: number of
+    samples of each curve and design, ``span``: places of the local maxima of each mode and design in the list: the
+    first, and begin and end of the rest, ``length``: of the list of each curve.
     """
 
     values: Array
+    abreast: Array
     guards: Array
     dips: Array
     said: Array
+    low: Array
     block: Array
     handed: Array
+    near: Array
     place: Counts
-    needed: Counts
+    needed: Spans
     span: Spans
-
-
-def looker(curve: Curve) -> Helper:
-    """Make the function ``look(k, a, b, c, n, table, mode, doubts, room)`` of a curve.
-
-    It samples one design, with n samples at first, and returns the number of samples that resolve the curve, their
-    largest and least, and a status: OK; NOT_ROTATABLE, where a later stage does not reach; OPEN.  The samples stand in
-    room.values[2 ... n + 1], closed periodically.
-    """
-    guarded, samples, take = curve.guarded, curve.samples, taker(curve)
-
-    def look(
-        k: Any, a: float, b: float, c: float, n: int, table: CosSin, mode: int, doubts: Any, room: Scratch
-    ) -> tuple[int, float, float, int]:  # fmt: skip
-        # One return only: with several the references to each array are counted, which takes as long as the samples.
-        code, most, least, values, guards = LOOKING, 0.0, 0.0, room.values, room.guards
-        while code == LOOKING and n <= MOST:
-            take(k, a, b, c, n, table, values, guards, room.handed)
-            n, most, least, code = _resolved(n, values, guards, mode, doubts, guarded, samples)
-        return n, most, least, OPEN if code == LOOKING else code
-
-    return generated_inline(f"look_{curve.name}", look)
+    length: Counts
 
 
 @inline
-def _resolved(
-    n: int, values: Array, guards: Array, mode: int, doubts: Any, guarded: int, samples: float
+def resolved(
+    n: int, values: Array, guards: Array, mode: int, doubts: Any, guarded: int, density: float
 ) -> tuple[int, float, float, int]:
-    """Judge n samples: number of samples needed, largest and least of the n, and a status, LOOKING if n are too few."""
+    """Judge n samples of one design: number of samples needed, largest and least of the n, and a status.
+
+    The status is OK; LOOKING, if n are too few; NOT_ROTATABLE, where a later stage does not reach; OPEN.
+    """
     code, needed = LOOKING, n
     for s in range(guarded):
         low, nearest = dips(n, guards, s * GUARD_ROW)
         if code == LOOKING and not low > doubts[s + 1]:
             code = st.NOT_ROTATABLE if low < -doubts[s + 1] else OPEN
-        needed = samples_for(samples, n, nearest, needed)
+        needed = samples_for(density, n, nearest, needed)
     fourth, most, least = _spread(n, values)
     size = max(most, -least)
     scale = size if mode == 0 else most - least
@@ -157,10 +144,14 @@ def _resolved(
     return needed if code == LOOKING else n, most, least, code
 
 
-def taker(curve: Curve) -> Helper:
-    """Make the function that fills ``values`` and ``guards`` with n samples, closed periodically as `looker` says."""
-    guarded, drive, sample, hand, get = curve.guarded, curve.drive, curve.sample, curve.hand, curve.take
-    guard_rows, keep, keep_last = keepers(curve)
+def taker(of: Sampling) -> Helper:
+    """Make the function that fills ``values`` and ``guards`` with n samples of one design, closed periodically.
+
+    The samples of each curve stand in the places 2 ... n + 1 of its `VALUES` numbers, the discriminants of each later
+    stage in the places 1 ... n of its `GUARD_ROW` numbers.
+    """
+    curves, guarded, drive, sample, hand, get = of.curves, of.guarded, of.drive, of.sample, of.hand, of.take
+    (guard_rows, keep, keep_last), (value_rows, write) = keepers(of), writers(of)
 
     def take(
         k: Any, a: float, b: float, c: float, n: int, table: CosSin, values: Array, guards: Array, handed: Array
@@ -169,7 +160,8 @@ def taker(curve: Curve) -> Helper:
         for start in range(0, n, TOGETHER):
             many = min(TOGETHER, n - start)
             begin, first = n - FEWEST + start, start + 2
-            us, vs, here = cos[begin : begin + many], sin[begin : begin + many], values[first : first + many]
+            us, vs = cos[begin : begin + many], sin[begin : begin + many]
+            here = value_rows(values, VALUES, first, first + many)
             rows, low = handed_rows(handed, 0, many), guard_rows(guards, GUARD_ROW, 1 + start, 1 + start + many)
             for j in range(many):
                 t, deltas = drive(k, us[j], vs[j])
@@ -177,11 +169,13 @@ def taker(curve: Curve) -> Helper:
                 keep(low, deltas, j)
             for j in range(many):
                 y, delta = sample(k, a, b, c, get(rows, j))
-                here[j] = y
+                write(here, j, y)
                 keep_last(low, delta, j)
-        values[0], values[1], values[n + 2], values[n + 3] = values[n], values[n + 1], values[2], values[3]
+        for c in range(curves):
+            own = values[c * VALUES : (c + 1) * VALUES]
+            own[0], own[1], own[n + 2], own[n + 3] = own[n], own[n + 1], own[2], own[3]
         for s in range(guarded):
             row = s * GUARD_ROW
             guards[row], guards[row + n + 1] = guards[row + n], guards[row + 1]
 
-    return generated_inline(f"take_{curve.name}", take)
+    return generated_inline(f"take_{of.name}", take)

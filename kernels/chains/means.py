@@ -20,7 +20,7 @@ from kernels.chains.curves import Curve, curve
 from kernels.chains.form import Helper
 from kernels.chains.halves import HANDED
 from kernels.chains.listing import aligned
-from kernels.chains.look import FEWEST, GUARD_ROW, LOOKING, MOST, OPEN, dips, taker
+from kernels.chains.look import FEWEST, GUARD_ROW, LOOKING, MOST, OPEN, VALUES, dips, taker
 from kernels.jit import generated, generated_inline, inline
 from kernels.types import EPS, TWO_PI, Array, CosSin, Status
 
@@ -43,15 +43,16 @@ def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
     more samples are needed; with the last two both are nan.
     """
     of = curve(chain, order, along)
-    constants, doubts, guarded, last = chain.record.constants, chain.record.doubts, of.guarded, chain.stages - 1
-    take, blur = taker(of), _blur(of)
+    alone = of.alone
+    constants, doubts, guarded, last = chain.record.constants, chain.record.doubts, alone.guarded, chain.stages - 1
+    take, blur = taker(alone), _blur(of)
     power = 2.0 * max(order - 1, 0)
 
     def mean(
         designs: Array, opening: Status, distance: Array, table: CosSin, made_of: Array, target: float,
         status: Status, found: Array,
     ) -> None:  # fmt: skip
-        values, guards, handed = aligned(MOST + 4), aligned(max(guarded, 1) * GUARD_ROW), aligned(HANDED)
+        values, guards, handed = aligned(VALUES), aligned(max(guarded, 1) * GUARD_ROW), aligned(HANDED)
         sums, thin, per_rho = np.empty(ARCS), np.empty(3 * FEW), PER_POWER * power - PER_TARGET * math.log(target)
         for i in range(designs.shape[0]):
             found[0, i], found[1, i] = math.nan, math.nan
@@ -81,7 +82,7 @@ def mean_squares(chain: Chained, order: int, along: bool = False) -> Helper:
                 n *= 2
             status[i] = OPEN if code == LOOKING else code
 
-    return generated(f"mean_{of.name}", mean)
+    return generated(f"mean_{alone.name}", mean)
 
 
 @inline
@@ -134,4 +135,4 @@ def _blur(of: Curve) -> Helper:
             total += here[j]
         return total / count
 
-    return generated_inline(f"mean_blur_{of.name}", blur)
+    return generated_inline(f"mean_blur_{of.alone.name}", blur)

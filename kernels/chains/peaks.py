@@ -73,7 +73,7 @@ def refiner(curve: Curve, get: Helper) -> Helper:
                 m[i + U] = u
                 m[i + V] = v
 
-    return generated_part(f"refine_{curve.name}", refine)
+    return generated_part(f"refine_{curve.alone.name}", refine)
 
 
 def finisher(curve: Curve, get: Helper) -> Helper:
@@ -104,4 +104,4 @@ def finisher(curve: Curve, get: Helper) -> Helper:
             # Within this width of the top the curve falls by less than its rounding, so the place is not known better.
             m[i + REACH] = 4.0 * abs(step) + 2.0 * math.sqrt(blur / largest(bend, 1e-300))
 
-    return generated_part(f"finish_{curve.name}", finish)
+    return generated_part(f"finish_{curve.alone.name}", finish)

@@ -91,9 +91,9 @@ def true_extrema(
             continue
         if isinstance(curve, fused.FusedCurve):
             opened = opened or curve.opened(designs)
-            opposite = request._replace(mode=-request.mode)
-            both = (request, opposite) if request.mode != 0 and opposite in requests else (request,)
-            answers = dict(zip(both, curve.extrema(both, designs, target, opened), strict=True))
+            both = fused.together(curve, requests)
+            found_both = fused.extrema(both, designs, target, opened)
+            answers = {one.request: answer for one, answer in zip(both, found_both, strict=True)}
         else:
             answers = {request: curve.extremum(designs, target)}
         for one, (quick, now, undecided) in answers.items():

@@ -6,7 +6,8 @@ shaft.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
 
@@ -52,59 +53,11 @@ class FusedCurve:
 
     def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> Found:
         """Compute the requested extremum of every design, as `extrema` does."""
-        return self.extrema((self.request,), designs, target, opened)[0]
-
-    def extrema(
-        self, requests: tuple[Request, ...], designs: Array, target: float, opened: Opened | None = None
-    ) -> list[Found]:
-        """Compute one extremum of every design, or the largest and the smallest value, which share their samples.
-
-        Parameters
-        ----------
-        requests : requests of this curve that differ only in their modes: one, or those of modes +1 and -1
-        designs : (n, P) matrix of the whole chain
-        target : relative accuracy
-        opened : result of `opened` for these designs and any curve of the chain, if it is known
-
-        Returns
-        -------
-        extremum : of each request, nan where the status is not OK or the search is undecided
-        status : (n,) OK or NOT_ROTATABLE
-        undecided : (n,) where a slower search is needed
-        """
-        n, (given, made_of, along) = len(designs), self._given(designs, opened)
-        # The place depends on which of several peaks is the highest.
-        tie = TIE if self.request.place else -1.0
-        modes = np.array([request.mode for request in requests])
-        status, found = np.empty((modes.size, n), np.uint8), np.empty((6, modes.size, n))
-        chains.find_extrema(_chained(self.forms), self.order, along)(
-            *given, sampling_tables(), made_of, modes, target, tie, status, found
-        )
-        value, phi, err, err_phi, scale, spacing = found.reshape(6, -1)
-        many = np.concatenate([designs] * modes.size) if modes.size > 1 else designs
-        if self.scale is not None:
-            factor = self.scale(many)
-            value, err, scale = value * factor, err * factor, scale * factor
-        extremum, codes = Extremum(value, phi, err, err_phi), status.ravel()
-        rounded = np.flatnonzero(codes == chains.ROUNDED)
-        if rounded.size:
-            self._confirm(many, extremum, rounded, modes[rounded // n], target * scale[rounded], spacing[rounded])
-        if self.request.place:
-            top = np.flatnonzero((codes == st.OK) | (codes == chains.ROUNDED))
-            slope, known = self.family.derivative_of[self.request.pose], (phi[top], err_phi[top])
-            places, err_phi[top] = polished(self.family, many[top], slope, *known)
-            phi[top] = np.mod(places, TWO_PI)
-        undecided = status == chains.OPEN
-        # A discriminant is defined also where the links do not reach; the slower search computes it there.
-        if self.order == MARGIN:
-            undecided |= status == st.NOT_ROTATABLE
-        status = np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8)
-        each = (Extremum(*(column[k * n : (k + 1) * n] for column in extremum)) for k in range(modes.size))
-        return list(zip(each, status, undecided, strict=True))
+        return extrema((self,), designs, target, opened)[0]
 
     def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
         """Compute root mean squares over the turn, their errors, status and undecided designs, as in `extremum`."""
-        n, (given, made_of, along) = len(designs), self._given(designs, None)
+        n, (given, made_of, along) = len(designs), self.given(designs, None)
         status, found = np.empty(n, np.uint8), np.empty((2, n))
         chains.mean_squares(_chained(self.forms), self.order, along)(
             *given, sampling_tables(), made_of, target, status, found
@@ -127,54 +80,122 @@ class FusedCurve:
         opens(designs, opening, distance)
         return designs, opening, distance
 
-    def _given(self, designs: Array, opened: Opened | None) -> tuple[Opened, Array, bool]:
+    def given(self, designs: Array, opened: Opened | None) -> tuple[Opened, Array, bool]:
         """Return the opened designs, the curve's coefficients, and whether the part across a line is zero."""
         stage = self.family.stages[len(self.forms) - 1]
         made_of = np.ascontiguousarray(self.made_of(designs[:, stage.columns]))
         # Positions along and across a line are often wanted together: they share a kernel, which saves compiling.
         return opened or self.opened(designs), made_of, self.order >= 1 and not made_of[:, 1].any()
 
-    def _confirm(
-        self, designs: Array, found: Extremum, rows: Index, modes: Index, tolerance: Array, spacing: Array
-    ) -> None:
-        """Replace extrema that rounding may have moved too far by those of precise poses, in place."""
-        precise, pose = self.family.precise(), self.request.pose
-        phi = found.phi[rows]
-        there = self._precisely(precise, designs[rows], phi)
-        sign = np.where(modes != 0, modes, np.where(there[pose] < 0.0, -1.0, 1.0))
-        height = np.where(modes != 0, modes * found.value[rows], np.abs(found.value[rows]))
-        blur = found.err[rows]
 
-        def sample(active: Index, phi: Array) -> Array:
-            poses, _ = pose_columns(precise, designs[rows[active]], phi, [pose])
-            return sign[active, None] * poses[pose]
+def together(curve: FusedCurve, requests: Sequence[Request]) -> tuple[FusedCurve, ...]:
+    """Choose the curves of the requests that share samples with one, which is among them, in the order of `extrema`.
 
-        peaks = Peaks(phi.copy(), height, found.err_phi[rows], blur, height, spacing, SHRINK * spacing)
-        peaks = confirmed(sample, peaks, tolerance, np.full(rows.size, np.inf), blur, sign * there[pose])
-        found.value[rows] = np.where(modes < 0, -peaks.height, peaks.height)
-        found.phi[rows], found.err_phi[rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
-        moved = np.flatnonzero(peaks.phi != phi)
-        if moved.size:
-            again = self._precisely(precise, designs[rows[moved]], peaks.phi[moved])
-            for name, values in again.items():
-                there[name][moved] = values
-        found.err[rows] = peaks.err_height + self._behind(designs[rows], there) * np.abs(peaks.height)
+    Both modes of a curve share samples, and so do the largest magnitudes of its first two derivatives.
+    """
+    request, order, slopes = curve.request, curve.order, curve.family.derivative_of
+    if request.mode != 0:
+        other = replace(curve, request=request._replace(mode=-request.mode))
+    elif order in (1, 2) and not request.place:
+        pose = (
+            slopes.get(request.pose, "") if order == 1 else next((x for x in slopes if slopes[x] == request.pose), "")
+        )
+        other = replace(curve, request=request._replace(pose=pose), order=3 - order)
+    else:
+        other = curve
+    if other is curve or other.request not in requests:
+        return (curve,)
+    return (curve, other) if curve.order <= other.order else (other, curve)
 
-    def _precisely(self, precise: Family, designs: Array, phi: Array) -> dict[str, Array]:
-        """Evaluate the pose output and the later stages' discriminants at one crank angle of each design."""
-        names = [self.request.pose, *(loop.discriminant for loop in self._later())]
-        poses, _ = pose_columns(precise, designs, phi[:, None], list(dict.fromkeys(names)))
-        return {name: values[:, 0].copy() for name, values in poses.items()}
 
-    def _later(self) -> list[Assembly]:
-        return [loop for loop in self.family.every(Assembly) if loop.stage and 2 <= int(loop.stage) <= len(self.forms)]
+def extrema(curves: tuple[FusedCurve, ...], designs: Array, target: float, opened: Opened | None = None) -> list[Found]:
+    """Compute one extremum of every design, or two that share their samples.
 
-    def _behind(self, designs: Array, there: dict[str, Array]) -> Array:
-        """Relative change of a value due to the rounded input angles of the later stages' precise poses."""
-        amplified = np.ones(len(designs))
-        for loop in self._later():
-            amplified += np.abs(loop.scale(designs) / there[loop.discriminant])
-        return 4.0 * EPS * amplified
+    Parameters
+    ----------
+    curves : one; one in both modes; or without ``place`` the first and the second derivative of one
+    designs : (n, P) matrix of the whole chain
+    target : relative accuracy
+    opened : result of `FusedCurve.opened` for these designs and any curve of the chain, if it is known
+
+    Returns
+    -------
+    extremum : of each curve, nan where the status is not OK or the search is undecided
+    status : (n,) OK or NOT_ROTATABLE
+    undecided : (n,) where a slower search is needed
+    """
+    first, of_order = curves[0], {curve.order: curve for curve in curves}
+    n, (given, made_of, along) = len(designs), first.given(designs, opened)
+    # The place depends on which of several peaks is the highest.
+    tie = TIE if first.request.place else -1.0
+    modes = np.array([curve.request.mode for curve in curves])
+    status, found = np.empty((modes.size, n), np.uint8), np.empty((6, modes.size, n))
+    chains.find_extrema(_chained(first.forms), tuple(of_order), along)(
+        *given, sampling_tables(), made_of, modes, target, tie, status, found
+    )
+    value, phi, err, err_phi, scale, spacing = found.reshape(6, -1)
+    many = np.concatenate([designs] * modes.size) if modes.size > 1 else designs
+    if first.scale is not None:
+        factor = first.scale(many)
+        value, err, scale = value * factor, err * factor, scale * factor
+    extremum, codes = Extremum(value, phi, err, err_phi), status.ravel()
+    rounded = np.flatnonzero(codes == chains.ROUNDED)
+    if rounded.size:
+        which, distinct = rounded // n, tuple(of_order.values())
+        number = np.array([list(of_order).index(curve.order) for curve in curves])[which]
+        _confirm(distinct, number, modes[which], many, extremum, rounded, target * scale[rounded], spacing[rounded])
+    if first.request.place:
+        top = np.flatnonzero((codes == st.OK) | (codes == chains.ROUNDED))
+        slope, known = first.family.derivative_of[first.request.pose], (phi[top], err_phi[top])
+        places, err_phi[top] = polished(first.family, many[top], slope, *known)
+        phi[top] = np.mod(places, TWO_PI)
+    undecided = status == chains.OPEN
+    # A discriminant is defined also where the links do not reach; the slower search computes it there.
+    if first.order == MARGIN:
+        undecided |= status == st.NOT_ROTATABLE
+    status = np.where(undecided | (status == chains.ROUNDED), st.OK, status).astype(np.uint8)
+    each = (Extremum(*(column[k * n : (k + 1) * n] for column in extremum)) for k in range(modes.size))
+    return list(zip(each, status, undecided, strict=True))
+
+
+def _confirm(
+    curves: tuple[FusedCurve, ...], number: Index, modes: Index, designs: Array, found: Extremum, rows: Index,
+    tolerance: Array, spacing: Array,
+) -> None:  # fmt: skip
+    """Replace extrema that rounding may have moved too far by those of precise poses, in place.
+
+    ``number`` is that of the curve, by rows, as are ``modes``.
+    """
+    precise, designs, phi, blur = curves[0].family.precise(), designs[rows], found.phi[rows], found.err[rows]
+    later = [x for x in precise.every(Assembly) if x.stage and 2 <= int(x.stage) <= len(curves[0].forms)]
+    poses = [curve.request.pose for curve in curves]
+
+    def evaluated(active: Index, phi: Array, beside: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
+        columns, _ = pose_columns(precise, designs[active], phi, list(dict.fromkeys([*poses, *beside])))
+        return np.choose(number[active, None], [columns[pose] for pose in poses]), columns
+
+    def precisely(active: Index, phi: Array) -> tuple[Array, Array]:
+        """Give values, and their relative change due to the rounded input angles of the later stages' precise poses."""
+        values, columns = evaluated(active, phi[:, None], [loop.discriminant for loop in later])
+        amplified = np.ones(active.size)
+        for loop in later:
+            amplified += np.abs(loop.scale(designs[active]) / columns[loop.discriminant][:, 0])
+        return values[:, 0], 4.0 * EPS * amplified
+
+    def sample(active: Index, phi: Array) -> Array:
+        return sign[active, None] * evaluated(active, phi)[0]
+
+    here, behind = precisely(np.arange(rows.size), phi)
+    sign = np.where(modes != 0, modes, np.where(here < 0.0, -1.0, 1.0))
+    height = np.where(modes != 0, modes * found.value[rows], np.abs(found.value[rows]))
+    peaks = Peaks(phi.copy(), height, found.err_phi[rows], blur, height, spacing, SHRINK * spacing)
+    peaks = confirmed(sample, peaks, tolerance, np.full(rows.size, np.inf), blur, sign * here)
+    found.value[rows] = np.where(modes < 0, -peaks.height, peaks.height)
+    found.phi[rows], found.err_phi[rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
+    moved = np.flatnonzero(peaks.phi != phi)
+    if moved.size:
+        _, behind[moved] = precisely(moved, peaks.phi[moved])
+    found.err[rows] = peaks.err_height + behind * np.abs(peaks.height)
 
 
 def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = False) -> FusedCurve | None:

@@ -238,10 +238,8 @@ def test_what_rounding_has_moved_too_far_is_taken_from_precise_poses(monkeypatch
     of, designs = CASES["rssr+guide"]
     request = Request("d2s", 0)
     called = []
-    confirm = fused.FusedCurve._confirm
-    monkeypatch.setattr(
-        fused.FusedCurve, "_confirm", lambda self, *given: (called.append(given[2].size), confirm(self, *given))
-    )
+    confirm = fused._confirm
+    monkeypatch.setattr(fused, "_confirm", lambda *given: (called.append(given[5].size), confirm(*given)))
     found, status = extrema.true_extrema(of, designs, [request], 1e-13)  # finer than plain poses are
     slow, _ = extrema.true_extrema(of, designs, [request], 1e-13, locate=True)
     assert sum(called) > 100 and (status == st.OK).all()
@@ -282,7 +280,7 @@ def test_jitted_kernels_give_the_bits_of_their_python_bodies(monkeypatch):
         results.append((least, *out))
     opening, distance = np.empty(6, np.uint8), np.empty(6)
     rssr.opening(few, opening, distance)
-    search, searched, table = chain_kernels.find_extrema(chain, 2), [], chain_kernels.sampling_tables()
+    search, searched, table = chain_kernels.find_extrema(chain, (2,)), [], chain_kernels.sampling_tables()
     made_of = np.tile([1.0, 0.0, 0.0], (6, 1))
     for function in (search, search.py_func):
         status, found = np.empty((2, 6), np.uint8), np.empty((6, 2, 6))

@@ -13,7 +13,9 @@ from kernels.arithmetic.intrinsics import power_below
 from kernels.chains.form import BLOCK
 from kernels.families import guide, rssr
 from kernels.jit import kernel
-from tests.support.turn_designs import needle_drives
+from sweep.quantities.kinds import Request
+from sweep.reductions import extrema, fused
+from tests.support.turn_designs import NEEDLE, needle_drives
 
 CHAIN = chain_kernels.chained((rssr.FORM, guide.FORM))
 
@@ -30,7 +32,7 @@ def found(designs, along=False):
     opening, distance = np.empty(n, np.uint8), np.empty(n)
     rssr.opening(designs, opening, distance)
     status, values, made_of = np.empty((1, n), np.uint8), np.empty((6, 1, n)), np.tile([1.0, 0.0, 0.0], (n, 1))
-    search = chain_kernels.find_extrema(CHAIN, 2, along)
+    search = chain_kernels.find_extrema(CHAIN, (2,), along)
     modes = np.array([0])
     search(designs, opening, distance, chain_kernels.sampling_tables(), made_of, modes, 1e-8, -1.0, status, values)
     return status[0], values[:, 0]
@@ -66,3 +68,20 @@ def test_derivatives_along_the_line_have_the_bits_of_those_in_any_direction():
     designs = needle_drives(12 * BLOCK, 4)
     for general, along in zip(found(designs), found(designs, along=True), strict=True):
         np.testing.assert_array_equal(general, along)
+
+
+@pytest.mark.parametrize("target", [1e-3, 1e-8, 1e-13])  # at the finest most are confirmed by precise poses
+def test_velocity_and_acceleration_share_samples_and_have_the_bits_of_each_alone(target):
+    designs, both = needle_drives(12 * BLOCK, 5), (Request("d2s", 0), Request("ds", 0))
+    curve = fused.curve_of(NEEDLE, both[0], False)
+    assert [one.order for one in fused.together(curve, both)] == [1, 2]
+    assert fused.together(curve, both[:1]) == (curve,)
+    assert fused.together(curve, (both[0], both[1]._replace(mode=1))) == (curve,)
+    placed = fused.curve_of(NEEDLE, both[0]._replace(place=True), False)
+    assert fused.together(placed, [one._replace(place=True) for one in both]) == (placed,)
+    shared, status = extrema.true_extrema(NEEDLE, designs, both, target)
+    assert set(np.unique(status)) >= {st.OK, st.NOT_ROTATABLE}
+    for request in both:
+        alone, own = extrema.true_extrema(NEEDLE, designs, [request], target)
+        np.testing.assert_array_equal(own, status)
+        np.testing.assert_array_equal(alone[request], shared[request])
