@@ -12,6 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from kernels.curves.root_search import bisected
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array
 
@@ -126,7 +127,6 @@ def tail(cosines: Array, sines: Array, size: float) -> float:
 
 
 FINER = 8  # samples per harmonic before a peak is refined
-BISECTIONS = 54
 LEVEL = 16.0 * EPS  # of the size: differences that are rounding
 
 
@@ -164,14 +164,14 @@ def turn_extremes(
 
 
 @inline
+def _rises(phi: float, c: Array, s: Array, sign: float) -> bool:
+    return sign * series(c, s, phi)[1] > 0.0
+
+
+@inline
 def _climbed(c: Array, s: Array, sign: float, low: float, high: float) -> float:
     """Find the top between two crank angles by bisection."""
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if sign * series(c, s, middle)[1] > 0.0:
-            low = middle
-        else:
-            high = middle
+    low, high = bisected(_rises, low, high, c, s, sign)
     return 0.5 * (low + high)
 
 

@@ -39,8 +39,6 @@ class Sliding(NamedTuple):
 class Criteria(NamedTuple):
     """Arms, coupler force, support forces, mean pressures for one direction of the coupler force."""
 
-    pi1: float
-    pi2: float
     arm: float
     force: float
     r1: float
@@ -82,7 +80,7 @@ def sliding_criteria(s: Sliding, moment: float, cos1: float, sin1: float, axial:
     force = moment / arm
     r1, r2, x = force * pi1 / span, force * pi2 / span, force * axial
     p1, p2, p3 = mean_pressures(r1, r2, x, s.d, s.l1, s.l2, s.d0)
-    return Criteria(pi1, pi2, arm, force, r1, r2, x, p1, p2, p3)
+    return Criteria(arm, force, r1, r2, x, p1, p2, p3)
 
 
 @inline

@@ -11,13 +11,13 @@ import math
 from typing import NamedTuple
 
 from kernels import status as st
+from kernels.curves.root_search import false_position
 from kernels.jit import inline, kernel  # long helpers are kernels: folded into one another they took 17 s to compile
 from kernels.types import TWO_PI, Array
 
 PLATE, RACK, FLIGHT = 0, 1, 2
 _PARTS = 4
 _MOST_EVENTS = 2048  # bounces die out in a few cells, with a restitution of 0.99 too
-_MOST_STEPS = 100
 
 # Outputs of a march, of its last turn, in order.
 OUTPUTS = (
@@ -139,7 +139,7 @@ def held(foot: Foot, y: float, bend: float) -> float:
 
 
 @inline
-def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int) -> float:
+def _measure(s: float, path: Array, foot: Foot, state: State, j: int, which: int) -> float:
     """Measure that changes sign at an event: height of the rack (0), contact force (1), gap below the foot (2)."""
     y, _, bend = rack_height(path, j, s)
     if which == 0:
@@ -151,26 +151,9 @@ def _measure(path: Array, foot: Foot, state: State, j: int, s: float, which: int
 
 @kernel
 def _root(path: Array, foot: Foot, state: State, j: int, low: float, high: float, which: int) -> float:
-    """Find the share of a cell where a measure passes zero by false position, halving a retained end (Illinois)."""
-    f_low, f_high = _measure(path, foot, state, j, low, which), _measure(path, foot, state, j, high, which)
-    for _ in range(_MOST_STEPS):
-        if f_low == f_high:
-            break
-        s = low - f_low * ((high - low) / (f_high - f_low))
-        if not low < s < high:
-            s = 0.5 * (low + high)
-        if s in (low, high):
-            break
-        f = _measure(path, foot, state, j, s, which)
-        if f == 0.0:
-            return s
-        if (f > 0.0) == (f_high > 0.0):
-            high, f_high, f_low = s, f, 0.5 * f_low
-        else:
-            low, f_low, f_high = s, f, 0.5 * f_high
-        if high - low <= 1e-15:
-            break
-    return high
+    """Find the share of a cell where a measure passes zero."""
+    at_low, at_high = _measure(low, path, foot, state, j, which), _measure(high, path, foot, state, j, which)
+    return false_position(_measure, low, high, at_low, at_high, path, foot, state, j, which)
 
 
 @kernel
@@ -197,7 +180,7 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
 def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
     """Find the share of the cell at which the state ends, and the measure; 2 and -1 if it lasts beyond the cell."""
     if state.mode == PLATE:
-        if _measure(path, foot, state, j, 1.0, 0) > 0.0:
+        if _measure(1.0, path, foot, state, j, 0) > 0.0:
             return _root(path, foot, state, j, s, 1.0, 0), 0
         return 2.0, -1
     before = s
@@ -208,8 +191,8 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
         if after <= before:
             continue
         if state.mode == RACK:
-            lost = _measure(path, foot, state, j, after, 1) < 0.0
-            sunk = _measure(path, foot, state, j, after, 0) < 0.0
+            lost = _measure(after, path, foot, state, j, 1) < 0.0
+            sunk = _measure(after, path, foot, state, j, 0) < 0.0
             first, which = 2.0, -1
             if lost:
                 first, which = _root(path, foot, state, j, before, after, 1), 1
@@ -219,12 +202,12 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
                     first, which = level, 0
             if which >= 0:
                 return first, which
-        elif _measure(path, foot, state, j, after, 2) < 0.0:
+        elif _measure(after, path, foot, state, j, 2) < 0.0:
             # A flight begins without a gap: halve towards its begin until there is one.  Where none is found, a rebound
             # ends at its highest point, a launch at the end of this part.
             clear = before
             for n in range(1, 30):
-                if _measure(path, foot, state, j, clear, 2) > 0.0:
+                if _measure(clear, path, foot, state, j, 2) > 0.0:
                     return _root(path, foot, state, j, clear, after, 2), 2
                 clear = before + (after - before) * 0.5**n
             return before if state.clear > state.since else after, 2
@@ -272,8 +255,8 @@ def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: fl
         tally[3] += (high - low) * (TWO_PI / path.shape[1])
         tally[4] += way
     # Force on a foot that follows the rack: at both ends of the piece, and where a parabola has its extremum.
-    first, last = _measure(path, foot, state, j, low, 1), _measure(path, foot, state, j, high, 1)
-    middle, rise = _measure(path, foot, state, j, 0.5 * (low + high), 1), last - first
+    first, last = _measure(low, path, foot, state, j, 1), _measure(high, path, foot, state, j, 1)
+    middle, rise = _measure(0.5 * (low + high), path, foot, state, j, 1), last - first
     bend = first - 2.0 * middle + last
     top = middle - rise * rise / (8.0 * bend) if abs(rise) < 2.0 * abs(bend) else middle
     tally[8] = min(tally[8], first, last, top)

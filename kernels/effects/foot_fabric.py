@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
+from kernels.curves.root_search import bisected
 from kernels.effects.foot import (
     FLIGHT,
     PLATE,
@@ -38,7 +39,6 @@ LYING = 3  # on the fabric, in place of PLATE and RACK
 TERMS = 22  # of the power series: over a radian the next term is below 2^-53
 PARTS = 4  # least number per cell
 MOST_PARTS = 4096  # per cell: with more the fabric would swing 650 times within a five-hundredth of a turn
-_HALVINGS = 60
 _SECTIONS = 40  # golden sections: a peak's place to 4e-9 of a piece, its height to rounding
 _GOLDEN = 0.6180339887498949
 _MOST_EVENTS = 64
@@ -99,22 +99,20 @@ def _look(
     return force, y, slope / piece.angle
 
 
+@inline
+def _lasts(x: float, foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array) -> bool:
+    """Whether the state lasts at the share x of the piece."""
+    return not _look(foot, fabric, state, piece, ground, series, x)[0] < 0.0
+
+
 @kernel
 def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array) -> float:
     """Find the share of the piece at which the state ends; 2 if it lasts beyond the piece."""
     low = 0.0
     for k in range(1, 5):
         high = 0.25 * k
-        off, _, _ = _look(foot, fabric, state, piece, ground, series, high)
-        if off < 0.0:
-            for _ in range(_HALVINGS):
-                middle = 0.5 * (low + high)
-                off, _, _ = _look(foot, fabric, state, piece, ground, series, middle)
-                if off < 0.0:
-                    high = middle
-                else:
-                    low = middle
-            return high
+        if not _lasts(high, foot, fabric, state, piece, ground, series):
+            return bisected(_lasts, low, high, foot, fabric, state, piece, ground, series)[1]
         low = high
     return 2.0
 
@@ -197,6 +195,12 @@ def _stretch(
     return State(LYING, phi, y, v, phi), end
 
 
+@inline
+def _not_yet(s: float, path: Array, j: int, rises: bool) -> bool:
+    """Whether the rack has yet to pass the plate at the share s of a cell."""
+    return (rack_height(path, j, s)[0] > 0.0) != rises
+
+
 @kernel
 def _cell(
     path: Array, foot: Foot, fabric: Fabric, state: State, j: int, parts: int, work: Array, tally: Array
@@ -208,14 +212,7 @@ def _cell(
         one, two = rack_height(path, j, low)[0], rack_height(path, j, last)[0]
         level = 2.0
         if (one > 0.0) != (two > 0.0):
-            below, above = low, last
-            for _ in range(_HALVINGS):
-                level = 0.5 * (below + above)
-                if (rack_height(path, j, level)[0] > 0.0) == (two > 0.0):
-                    above = level
-                else:
-                    below = level
-            level = above
+            _, level = bisected(_not_yet, low, last, path, j, two > 0.0)
         for _ in range(_MOST_EVENTS):
             high = level if low < level < last else last
             on_rack = two > 0.0 if low >= level or level > last else one > 0.0

@@ -15,6 +15,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.periodic import coefficients, on_grid, series, series_at, significant, tail
+from kernels.curves.root_search import bisected
 from kernels.effects.motor_line import steady_energy
 from kernels.jit import inline, kernel
 from kernels.types import Array, Status
@@ -203,6 +204,14 @@ def _energy(inertia: Array, work: Array, mean_speed: float, e: float) -> float:
 
 
 @inline
+def _rises(phi: float, jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float) -> bool:
+    """Whether sign times the speed rises; its slope has the sign of W' J - (E + W) J'."""
+    j_red, dj = series(jc, js, phi)
+    w, dw = series(wc, ws, phi)
+    return sign * (dw * j_red - (e + w) * dj) > 0.0
+
+
+@inline
 def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, inertia: Array, work: Array) -> float:
     """Find the largest (sign +1) or smallest (-1) speed: the best sample first, then its slope's zero by bisection."""
     best, where, step = -math.inf, 0.0, 2.0 * math.pi / work.size
@@ -210,15 +219,6 @@ def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, 
         value = sign * (e + work[j]) / inertia[j]
         if value > best:
             best, where = value, step * j
-    low, high = where - step, where + step
-    # The slope of (E + W)/J has the sign of W' J - (E + W) J'.
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        j_red, dj = series(jc, js, middle)
-        w, dw = series(wc, ws, middle)
-        if sign * (dw * j_red - (e + w) * dj) > 0.0:
-            low = middle
-        else:
-            high = middle
+    low, high = bisected(_rises, where - step, where + step, jc, js, wc, ws, e, sign)
     middle = 0.5 * (low + high)
     return math.sqrt(2.0 * (e + series(wc, ws, middle)[0]) / series(jc, js, middle)[0])

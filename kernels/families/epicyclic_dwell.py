@@ -15,6 +15,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2
+from kernels.curves.root_search import bisected
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
 from kernels.types import EPS, Array, Numbers, Status
@@ -124,7 +125,6 @@ def _put_derivatives(
             write(out.d3psi, i, j, t3 - 3.0 * (r2 * t1 + t2 * r1) + 2.0 * (3.0 * r1 * r1 - t1 * t1) * t1)
 
 
-HALVINGS = 90  # enough for the last digits of a dwell over 1e-8 rad, as for k next to 1
 STEPS = 64  # per turn of the pin in the search for the end of the band
 
 
@@ -144,6 +144,12 @@ def _output(k: float, front: float, arm: float, mesh: float, phi: float) -> tupl
     closing = 2.0 * math.sin(0.5 * (arm + 1.0) * phi) * math.sin(0.5 * (arm - 1.0) * phi)
     y1 = arm * (closing - (k - 1.0) * math.cos(arm * phi))
     return math.atan2(y, x), x * y1 - y * x1, y
+
+
+@inline
+def _below(phi: float, level: float, which: int, k: float, front: float, arm: float, mesh: float) -> bool:
+    """Whether a number of :func:`_output` is below a level."""
+    return _output(k, front, arm, mesh, phi)[which] < level
 
 
 @kernel
@@ -177,21 +183,9 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
         dwell_angle[i], deviation[i], band[i] = none, none, none
         if code == st.OK and k > 1.0 and arm > 1.0:
             # L sin(phi)/sin(L phi) rises from 1 to infinity: one root of y
-            low, high = 0.0, math.pi / arm
-            for _ in range(HALVINGS):
-                phi = 0.5 * (low + high)
-                if _output(k, front, arm, mesh, phi)[2] < 0.0:
-                    low = phi
-                else:
-                    high = phi
+            low, high = bisected(_below, 0.0, math.pi / arm, 0.0, 2, k, front, arm, mesh)
             returned = 0.5 * (low + high)
-            low, high = 0.0, returned
-            for _ in range(HALVINGS):
-                phi = 0.5 * (low + high)
-                if _output(k, front, arm, mesh, phi)[1] < 0.0:
-                    low = phi
-                else:
-                    high = phi
+            low, high = bisected(_below, 0.0, returned, 0.0, 1, k, front, arm, mesh)
             most = -_output(k, front, arm, mesh, 0.5 * (low + high))[0]
             step = 2.0 * math.pi / (arm * STEPS)
             low = returned
@@ -202,11 +196,6 @@ def dwell_measures(designs: Array, status: Status, dwell_angle: Array, deviation
                 code = st.NO_DWELL
                 dwell_angle[i], deviation[i], band[i] = math.nan, math.nan, math.nan
             else:
-                for _ in range(HALVINGS):
-                    phi = 0.5 * (low + high)
-                    if _output(k, front, arm, mesh, phi)[0] < most:
-                        low = phi
-                    else:
-                        high = phi
+                low, high = bisected(_below, low, high, most, 0, k, front, arm, mesh)
                 dwell_angle[i], deviation[i], band[i] = 2.0 * returned, most, low + high
         status[i] = code

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
+from kernels.curves.root_search import bisected
 from kernels.jit import inline, kernel
 from kernels.types import TWO_PI, Array, Status
 
 _CELLS = 4096
-_MOST_STEPS = 200
 
 OUTPUTS = (
     "x0", "v_entry", "omega_n", "jump_height_free", "flight_time_free", "k_min_contact", "F0_min_contact", "N_at_entry",
@@ -39,6 +39,11 @@ def _gap(d: Array, i: int, x0: float, v0: float, t: float) -> float:
 
 
 @inline
+def _is_above(t: float, d: Array, i: int, x0: float, v0: float) -> bool:
+    return _gap(d, i, x0, v0, t) > 0.0
+
+
+@inline
 def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> float:
     """Find the first time after the launch when the foot meets rack or plate; it meets the plate after ``longest``."""
     low = 0.0
@@ -52,14 +57,7 @@ def _first_contact(d: Array, i: int, x0: float, v0: float, longest: float) -> fl
                     low *= 0.5
                     if _gap(d, i, x0, v0, low) > 0.0:
                         break
-            for _ in range(_MOST_STEPS):
-                t = 0.5 * (low + high)
-                if t in (low, high):
-                    break
-                if _gap(d, i, x0, v0, t) > 0.0:
-                    low = t
-                else:
-                    high = t
+            low, high = bisected(_is_above, low, high, d, i, x0, v0)
             # Where the rack is below the plate the time to plate level is known in closed form.
             rack = d[i, 4] * math.sin(x0 + d[i, 3] * high) - d[i, 5]
             return longest if rack < 0.0 and j == _CELLS else high

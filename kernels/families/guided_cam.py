@@ -15,6 +15,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
+from kernels.curves.root_search import bisected
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import pose_status
@@ -104,7 +105,6 @@ HARMONICS = 6
 FIRST = 7
 COLUMNS = FIRST + 2 * HARMONICS
 LOOKS = 64  # samples over the turn: ten for each period of the highest harmonic
-STEPS = 60  # halvings of two samples' distance, which is 2^-2.3: the angle is then as exact as float64 has it
 
 
 class Reduced(NamedTuple):
@@ -135,6 +135,11 @@ def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float
 
 
 @inline
+def _falls(phi: float, designs: Array, i: int) -> bool:
+    return law(designs, i, math.cos(phi), math.sin(phi))[1].real < 0.0
+
+
+@inline
 def lowest(designs: Array, i: int) -> tuple[float, float]:
     """Find cosine and sine of the cam angle where P is least: of all valleys of LOOKS samples, by the slope's zero.
 
@@ -151,13 +156,7 @@ def lowest(designs: Array, i: int) -> tuple[float, float]:
     for j in range(LOOKS):
         after = law(designs, i, math.cos(step * (j + 1)), math.sin(step * (j + 1)))[0].real
         if here <= min(before, after) and here - (max(before, after) - here) <= least:
-            low, high = step * (j - 1), step * (j + 1)
-            for _ in range(STEPS):
-                middle = 0.5 * (low + high)
-                if law(designs, i, math.cos(middle), math.sin(middle))[1].real < 0.0:
-                    low = middle
-                else:
-                    high = middle
+            low, _ = bisected(_falls, step * (j - 1), step * (j + 1), designs, i)
             c, s = math.cos(low), math.sin(low)
             value = law(designs, i, c, s)[0].real
             if value < best:
@@ -246,7 +245,6 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
 
 
 ROOT_LOOKS = 512  # samples over the turn; where S is small its root has far shorter waves than the series P
-ROOT_STEPS = 60  # halvings of two samples' distance, which is 2^-5: the place is then as exact as float64 has it
 
 
 @kernel
@@ -297,6 +295,12 @@ def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> t
 
 
 @inline
+def _needs_more(phi: float, designs: Array, i: int, r: Reduced, cotangent: float) -> bool:
+    """Whether the radius needed rises with the cam angle."""
+    return _need(designs, i, r, cotangent, phi)[1] > 0.0
+
+
+@inline
 def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[float, float]:
     """Find the largest radius needed over the turn and its place: of all tops of the samples, by the slope's zero."""
     step, largest = 2.0 * math.pi / ROOT_LOOKS, -math.inf
@@ -307,13 +311,7 @@ def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[floa
     for j in range(ROOT_LOOKS):
         after = _need(designs, i, r, cotangent, step * (j + 1))[0]
         if here >= max(before, after) and here + (here - min(before, after)) >= largest:
-            low, high = step * (j - 1), step * (j + 1)
-            for _ in range(ROOT_STEPS):
-                middle = 0.5 * (low + high)
-                if _need(designs, i, r, cotangent, middle)[1] > 0.0:
-                    low = middle
-                else:
-                    high = middle
+            low, _ = bisected(_needs_more, step * (j - 1), step * (j + 1), designs, i, r, cotangent)
             # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
             value = max(_need(designs, i, r, cotangent, low)[0], here)
             if value > best:

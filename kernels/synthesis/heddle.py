@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from kernels import status as st
+from kernels.curves.root_search import bisected
 from kernels.families.heddle import driven, four_bar
 from kernels.jit import inline, kernel
 from kernels.types import EPS, TWO_PI, Array, Status
@@ -179,10 +180,10 @@ def _travel(arm: float, lever: float, frame: float, end: float, half: float) -> 
 
 
 @inline
-def _too_long(arm: float, lever: float, frame: float, end: float, half: float, stroke: float, beyond: bool) -> bool:
-    """Whether an arm gives the stroke or more, or passes a dead point; ``beyond``: one at -half does not count."""
+def _too_short(arm: float, lever: float, frame: float, end: float, half: float, stroke: float, beyond: bool) -> bool:
+    """Whether an arm gives less than the stroke and passes no dead point; ``beyond``: one at -half does not count."""
     up, down, code = _travel(arm, lever, frame, end, half)
-    return up - down >= stroke or (code != st.OK and not (beyond and up == up))
+    return not (up - down >= stroke or (code != st.OK and not (beyond and up == up)))
 
 
 @kernel
@@ -212,17 +213,10 @@ def heddle_shaft_arms(shafts: Array, arms: Array, status: Status) -> None:
             # Upwards from the first-order arm, until an arm has the stroke or passes a dead point: either is too long.
             low, high = 0.0, lever * (0.5 * stroke / end) / math.sin(half)
             for _ in range(_MOST_STEPS):
-                if _too_long(high, lever, frame, end, half, stroke, beyond):
+                if not _too_short(high, lever, frame, end, half, stroke, beyond):
                     break
                 low, high = high, 1.03125 * high
-            for _ in range(_MOST_STEPS):
-                middle = 0.5 * (low + high)
-                if middle in (low, high):
-                    break
-                if _too_long(middle, lever, frame, end, half, stroke, beyond):
-                    high = middle
-                else:
-                    low = middle
+            _, high = bisected(_too_short, low, high, lever, frame, end, half, stroke, beyond)
             up, down, code = _travel(high, lever, frame, end, half)
             if code == st.OK and up - down >= stroke:
                 status[i] = st.OK

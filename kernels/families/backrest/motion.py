@@ -12,6 +12,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
+from kernels.curves.root_search import bisected
 from kernels.families.backrest.closure import BracketPose, Mode, forces, place, residual, scaled, spring
 from kernels.jit import inline, kernel
 from kernels.types import EPS, Array, Status
@@ -22,19 +23,8 @@ _MOST_STEPS = 200  # a bound, so that the loops always end; halving takes some 6
 
 
 @inline
-def _edge(d: Array, good: float, bad: float, rho: float, mode: int) -> float:
-    """Last angle from ``good`` towards ``bad`` at which the equation is defined."""
-    for _ in range(_MOST_STEPS):
-        middle = 0.5 * (good + bad)
-        # no number lies between: the edge is known to the last bit
-        if middle in (good, bad):
-            break
-        _, defined = residual(d, middle, rho, mode)
-        if defined:
-            good = middle
-        else:
-            bad = middle
-    return good
+def _defined(phi: float, d: Array, rho: float, mode: int) -> bool:
+    return residual(d, phi, rho, mode)[1]
 
 
 @inline
@@ -114,10 +104,10 @@ def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
         left, f_left, right, f_right = x1, f1, x2, f2
         # towards the edge the residual may still change its sign: the part up to it is a cell of its own
         if ok1 and not ok2:
-            right = _edge(d, x1, x2, rho, mode)
+            right, _ = bisected(_defined, x1, x2, d, rho, mode)
             f_right, _ = residual(d, right, rho, mode)
         if ok2 and not ok1:
-            left = _edge(d, x2, x1, rho, mode)
+            left, _ = bisected(_defined, x2, x1, d, rho, mode)
             f_left, _ = residual(d, left, rho, mode)
         if ok0 and ok1 and ok2 and f0 * f1 > 0.0 and f1 * f2 > 0.0 and abs(f1) <= min(abs(f0), abs(f2)):
             dip, f_dip = _dip(d, x0, x2, math.copysign(1.0, f1), rho, mode)

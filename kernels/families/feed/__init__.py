@@ -4,7 +4,6 @@
 leaving, ``triad`` is the rack on three leads.
 """
 
-from kernels.families.feed.motion import differences as differences
 from kernels.families.feed.motion import feeding as feeding
 from kernels.families.feed.motion import lift_rows as lift_rows
 from kernels.families.feed.motion import poses as poses

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
+from kernels.curves.root_search import false_position
 from kernels.families.feed.closure import (
     Driven,
     Reduced,
@@ -90,35 +91,6 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
 
 
 @kernel
-def differences(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status: Status, dq: Array) -> None:
-    """Weighted difference |F - E|^2 - q^2 of the lift coupler for a rack at prescribed angles; (10) of docs/feed.md.
-
-    Parameters
-    ----------
-    designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
-    cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
-    chi : (n, m) prescribed angles of the rack [rad]
-    status : (n, m) out, of the rocker alone;  dq : (n, m) out [length^2]; nan where the rocker is not assembled
-    """
-    for i in range(designs.shape[0]):
-        r = reduce_design(designs, i)
-        row = i if cos_phi.shape[0] > 1 else 0
-        for j in range(cos_phi.shape[1]):
-            u, v = cos_phi[row, j], sin_phi[row, j]
-            cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
-            status[i, j] = code if r.valid else st.INVALID_INPUT
-            h = rocker_pin(r, cos, sin, one, two)
-            e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
-            x, y = math.cos(chi[i, j]), math.sin(chi[i, j])
-            dx, dy = h.x + x * r.fx - y * r.fy - e.x, h.y + y * r.fx + x * r.fy - e.y
-            # product of difference and sum: for a good coupler, where digits matter, the squares nearly cancel
-            length = math.sqrt(dx * dx + dy * dy)
-            value = (length - r.q) * (length + r.q)
-            assembled = status[i, j] == st.OK or status[i, j] == st.DEAD_POINT
-            dq[i, j] = (value * r.unit) * r.unit if assembled else math.nan
-
-
-@kernel
 def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status: Status, rows: Array) -> None:
     """Compute the weighted difference as a linear form of the lift coupler's dimensions; (10) of docs/feed.md.
 
@@ -151,7 +123,6 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
 
 
 SAMPLES = 256
-_MOST_STEPS = 100  # a bound, so that the loop always ends
 _PANELS, _MOST_PANELS = 16, 4096
 _AREA_SETTLED = 1e-10  # relative change by halved panels, below which the error of 8 points per panel is rounding
 # Gauss-Legendre, 8 points: abscissae and weights of the positive half
@@ -165,38 +136,11 @@ EVENTS = (
 
 
 @inline
-def _height(r: Reduced, phi: float, order: int) -> float:
+def _height(phi: float, r: Reduced, order: int) -> float:
     """Height of the tooth above the plate (order 0), or its first derivative by phi (order 1)."""
     tooth, _ = tooth_at(r, math.cos(phi), math.sin(phi))
     value: float = tooth.y - r.plate if order == 0 else tooth.y1
     return value
-
-
-@inline
-def _passage(r: Reduced, low: float, high: float, f_low: float, f_high: float, order: int) -> float:
-    """Find the zero of the height, or of its derivative, between angles of opposite signs by false position.
-
-    The end that stays is given half its value (Illinois), so that both ends close in.
-    """
-    for _ in range(_MOST_STEPS):
-        x = low - f_low * ((high - low) / (f_high - f_low))
-        # rounding may throw the secant's zero out of a bracket that has become narrow
-        if not low < x < high:
-            x = 0.5 * (low + high)
-        if x in (low, high):
-            break
-        f = _height(r, x, order)
-        if f == 0.0:
-            return x
-        if (f > 0.0) == (f_high > 0.0):
-            high, f_high = x, f
-            f_low *= 0.5
-        else:
-            low, f_low = x, f
-            f_high *= 0.5
-        if high - low <= 4.0 * 2.0**-53 * max(abs(low), abs(high)):
-            break
-    return 0.5 * (low + high)
 
 
 @inline
@@ -222,15 +166,15 @@ def _between(r: Reduced, entry: float, leave: float) -> tuple[float, float, floa
         finer = _area(r, entry, leave, panels)
         area, change = finer, abs(finer - area)
     # the top is where the slope falls through zero: exact, where the largest of the samples would lie below it
-    before, f_before = entry, _height(r, entry, 1)
+    before, f_before = entry, _height(entry, r, 1)
     steps = 4 * _PANELS
     for k in range(1, steps + 1):
         phi = entry + (leave - entry) * (k / steps)
-        f = _height(r, phi, 1)
+        f = _height(phi, r, 1)
         # equality on one side alone: a top that falls on a step is found once
         if f_before > 0.0 >= f:
-            top = _passage(r, before, phi, f_before, f, 1) if f < 0.0 else phi
-            rise = max(rise, _height(r, top, 0))
+            top = false_position(_height, before, phi, f_before, f, r, 1) if f < 0.0 else phi
+            rise = max(rise, _height(top, r, 0))
         before, f_before = phi, f
     return rise, area, change
 
@@ -283,8 +227,10 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
         if crossings == 0:
             status[i] = st.NO_EVENT
             continue
-        entry = _passage(r, first * step, (first + 1) * step, heights[first], heights[(first + 1) % SAMPLES], 0)
-        leave = _passage(r, last * step, (last + 1) * step, heights[last % SAMPLES], heights[(last + 1) % SAMPLES], 0)
+        before, after = heights[first], heights[(first + 1) % SAMPLES]
+        entry = false_position(_height, first * step, (first + 1) * step, before, after, r, 0)
+        before, after = heights[last % SAMPLES], heights[(last + 1) % SAMPLES]
+        leave = false_position(_height, last * step, (last + 1) * step, before, after, r, 0)
         one, _ = tooth_at(r, math.cos(entry), math.sin(entry))
         two, _ = tooth_at(r, math.cos(leave), math.sin(leave))
         rise, area, change = _between(r, entry, leave)

@@ -11,6 +11,7 @@ import math
 from collections import namedtuple
 
 from kernels import status as st
+from kernels.curves.root_search import false_position
 from kernels.families.free_cam.contact import (
     FINEST,
     HALVINGS,
@@ -65,7 +66,7 @@ def lean(cam: Cam, pull: Pull, at: float) -> tuple[float, float]:
 
 
 @inline
-def excess(cam: Cam, pull: Pull, side: float, at: float) -> float:
+def excess(at: float, cam: Cam, pull: Pull, side: float) -> float:
     """T12 . tangent - side sin(rho) |T12|: zero at the limit point of that side, falling along the edge far out."""
     along, whole = lean(cam, pull, at)
     return float(along - side * pull.sine * whole)
@@ -89,7 +90,7 @@ def steepest_excess(cam: Cam, pull: Pull, low: float, high: float) -> float:
 def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, most: float) -> float:
     """Find the first limit point of one side from ``start`` along the edge, within ``most``; nan if there is none."""
     end = reach(cam) + 1e-3
-    at, value = start, excess(cam, pull, side, start)
+    at, value = start, excess(start, cam, pull, side)
     # A start on a limit point is one: the walk looks for a change of sign and would step over it.
     if value == 0.0:
         return start
@@ -98,31 +99,11 @@ def next_limit(cam: Cam, pull: Pull, side: float, start: float, sense: float, mo
         span = 0.25 * max(end, abs(at))
         bound = steepest_excess(cam, pull, min(at, at + sense * span), max(at, at + sense * span))
         following = at + sense * min(span, max(abs(value) / bound, FINEST * end))
-        new = excess(cam, pull, side, following)
+        new = excess(following, cam, pull, side)
         if (new < 0.0) != (value < 0.0):
-            return _bisected(cam, pull, side, at, following, value)
+            return false_position(excess, at, following, value, new, cam, pull, side)
         at, value = following, new
     return math.nan
-
-
-@inline
-def _bisected(cam: Cam, pull: Pull, side: float, low: float, high: float, at_low: float) -> float:
-    """Find the zero of :func:`excess` between low and high by at most HALVINGS steps of the Illinois method."""
-    f_low, f_high = at_low, excess(cam, pull, side, high)
-    for _ in range(HALVINGS):
-        middle = high - f_high * (high - low) / (f_high - f_low)
-        value = excess(cam, pull, side, middle)
-        if value == 0.0:
-            return middle
-        if (value < 0.0) != (f_high < 0.0):
-            low, f_low = high, f_high
-        else:
-            # the same end stayed twice: half its value draws the next secant over to its side (Illinois)
-            f_low = 0.5 * f_low
-        high, f_high = middle, value
-        if abs(high - low) <= 2.0**-52 * abs(high):
-            break
-    return high
 
 
 @inline

@@ -78,13 +78,14 @@ def test_feed_weighted_difference_matches_oracle():
         p = row["inputs"]
         phi = np.array([[p["phi"]]])
         chi = sweep.evaluate("feed", p, "chi").chi.to_numpy()[:, None] + 2.0**-10
-        status, dq = np.empty((1, 1), np.uint8), np.empty((1, 1))
+        status, rows = np.empty((1, 1), np.uint8), np.empty((5, 1, 1))
         matrix = np.array([[p.get(name, 0.0) for name in FIELDS]])
-        feed.differences(matrix, np.cos(phi), np.sin(phi), chi, status, dq)
+        feed.lift_rows(matrix, np.cos(phi), np.sin(phi), chi, status, rows)
+        dq = float(rows[:3, 0, 0] @ (p["fx"], p["fy"], 1.0)) - (p["q"] ** 2 - p["fx"] ** 2 - p["fy"] ** 2)
         expected = float(row["expected"]["dq_at_chi_plus_2m10"])
         # a difference of squares of lengths up to 10, known to the rounding of chi
         assert status[0, 0] == st.OK
-        assert abs(dq[0, 0] - expected) <= 64.0 * 2.0**-53 * p["q"] * (p["q"] + abs(p["fx"]) + abs(p["fy"]))
+        assert abs(dq - expected) <= 64.0 * 2.0**-53 * p["q"] * (p["q"] + abs(p["fx"]) + abs(p["fy"]))
 
 
 @settings(deadline=None, max_examples=15)
