@@ -166,13 +166,6 @@ def heading(group: Sequence[Effect]) -> str:
     return f"{words} of many links" if len(group) > 2 and all(entry.tree for entry in group) else words
 
 
-def subject(group: Sequence[Effect]) -> str:
-    """Return the title of an effect, or what the titles of a group say before their colons."""
-    if len(group) == 1:
-        return group[0].title
-    return "; ".join(dict.fromkeys(entry.title.split(": ")[0] for entry in group))
-
-
 def needed(group: Iterable[Effect]) -> list[str]:
     """Return what the effects of a group need, without the family in front of the names."""
     return list(dict.fromkeys(n.removeprefix(f"{e.families[0]}_") for e in group for n in e.needs))
@@ -345,7 +338,7 @@ def page() -> str:
             shared=shared_inputs(groups),
             without_joint=without_joint,
             heading=heading,
-            subject=subject,
+            subject=lambda group: "; ".join(dict.fromkeys(entry.title.split(": ")[0] for entry in group)),
             families=lambda group: dict.fromkeys(name for entry in group for name in entry.families),
             needed=needed,
             link_lists=link_lists,

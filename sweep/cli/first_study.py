@@ -1,4 +1,4 @@
-"""Text of a first study of a mechanism or a machine: its example, with two parameters swept, every table explained."""
+"""Text of a first study of a mechanism or a machine: a start, with two parameters swept, every table explained."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+
 from sweep.cli.families import described, main_outputs
+from sweep.evaluation.poses import evaluate
 from sweep.families.base import Family, March
+from sweep.families.capabilities import Assembly
 from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, parts, stem
 from sweep.pages import rendered
@@ -28,9 +32,52 @@ SWEPT = 2
 APART = 10  # mm between the frames of two members, along z
 OF_EACH = 2  # wanted outputs per member
 LEAST_SIZE = 20.0  # mm, least length of a member's longest dimension
-FIRST = ("swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation")
+FIRST = (
+    "swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation", "stitch_error", "impact_speed",
+)  # fmt: skip
+GOALS = ("max_abs_d2", "impact_speed", "stroke")  # beginnings of outputs to be made small, the first wanted one
 FEWEST_WANTED, MOST_WANTED = 3, 5
 WIDTH = 56  # column of the explanations
+OFFSETS = 12  # angles tried between the crank of a later stage and the rocker before it, over the turn
+POSES = 72  # of each
+
+# Starts that turn with pressure angles below 45 degrees, where the example, which also serves as a hard input, does not
+# [mm; SI with masses or forces; rad].
+_DEG = math.pi / 180.0
+_FOUR_BAR = {"a": 10.0, "b": 26.0, "c": 34.0, "e": 40.0, "xi": 28.0, "eta": -24.0, "branch": 1.0}
+_RSSR = {"a": 10.0, "b": 36.0, "c": 26.0, "e": 40.0, "f": 6.0, "g": -4.0, "alpha": 40.0 * _DEG, "branch": -1.0}
+_FEED = {
+    "h_a": 4.0, "h_b": 34.0, "h_c": 16.0, "h_e": 35.0, "rh": 12.0, "xE": 56.0, "yE": 7.0, "rE": 1.8, "q": 26.0,
+    "fx": -17.0, "fy": 6.0, "tx": -3.0, "ty": 9.0, "y_plate": 15.0,
+}  # fmt: skip
+STARTS: Mapping[str, Mapping[str, float]] = {
+    "rssr": _RSSR,
+    "four_bar": _FOUR_BAR,
+    "guide": _FOUR_BAR | {"lam": 129.8 * _DEG, "h": 26.0},
+    "five_link": {
+        "a": 10.0, "b": 36.0, "c": 22.0, "e": 40.0, "f": 6.0, "g": -4.0, "alpha": 40.0 * _DEG, "h": 3.0, "s2": 1.0,
+    },
+    "kim_dison": {"r": 10.0, "l": 40.0, "h": 20.0, "a": 40.0, "b": 15.0, "branch": -1.0},
+    "spherical_looper": {f"{name}1": x for name, x in _RSSR.items()} | {
+        "f1": 11.0, "g1": 0.0, "alpha1": 70.0 * _DEG, "o": 14.0, "delta": 70.0 * _DEG, "gamma": 160.0 * _DEG,
+        "c0x": -10.0, "c0y": 17.0, "c0z": 9.0, "p0x": -25.0, "p0y": 19.0, "p0z": 28.0, "a2": 3.0, "b2": 68.0,
+        "x2": 3.0, "y2": -41.0, "z2": -35.0, "theta2": 80.0 * _DEG, "beta2": 98.0 * _DEG, "offset2": 5.0 * _DEG,
+    },
+    "cylindrical_looper": {
+        "a1": 10.0, "b1": 39.0, "c1": 25.0, "e1": 44.0, "f1": 10.0, "g1": -6.0, "alpha1": 30.0 * _DEG,
+        "a2": 2.0, "b2": 25.0, "e2": -1.0, "f2": -5.0, "alpha2": 23.0 * _DEG, "offset2": 40.0 * _DEG, "slides": 1.0,
+        "p0x": 21.0, "p0y": -1.0, "p0z": 36.0,
+    },
+    "feed_foot": {name: 1e-3 * x for name, x in _FEED.items()} | {
+        "dh": -17.0 * _DEG, "dE": 46.0 * _DEG, "h_sigma": -1.0, "bar_branch": -1.0,
+        "m": 0.05, "k": 1500.0, "F0": 6.0, "omega": 200.0,
+    },
+    "rssr+guide": {
+        "a1": 12.0, "b1": 31.5, "c1": 17.6, "e1": 28.0, "f1": -22.0, "g1": 0.0, "alpha1": 90.0 * _DEG, "branch1": 1.0,
+        "a2": 18.7, "b2": 23.1, "c2": 41.5, "e2": 60.0, "xi2": 16.9, "eta2": -6.5, "lam2": 112.5 * _DEG, "h2": -8.9,
+        "branch2": 1.0, "offset2": 104.5 * _DEG,
+    },
+}  # fmt: skip
 
 
 def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float] | None = None) -> str:
@@ -52,7 +99,7 @@ def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float
             wanted=json.dumps(wanted),
             design=design_lines(family, swept_names(family), drawn),
             limits=limit_lines(family),
-            goal=next((w for w in wanted if w.startswith("max_abs_d2")), wanted[-1]),
+            goal=goal_of(wanted),
             march=isinstance(family.domain, March),
             reference=drawn and toml({"reference": {"design": design_entries(family, drawn)}}),
         )
@@ -82,7 +129,6 @@ def _machine_text(name: str, machine: Machine, schema: str) -> str:
         for m in machine.members
     }
     last, relations = machine.members[-1].name, _relations(machine)
-    goal = next((w for w in wanted[last] if w.startswith("max_abs_d2")), wanted[last][-1])
     text = rendered(
         "first_machine.toml.j2",
         name=name,
@@ -94,7 +140,7 @@ def _machine_text(name: str, machine: Machine, schema: str) -> str:
             [*(x for _, x in relations), *(f"{m}.{x}" for m, outputs in wanted.items() for x in outputs)]
         ),
         last_relation=relations[-1][1],
-        goal=f"{last}.{goal}",
+        goal=f"{last}.{goal_of(wanted[last])}",
     )
     return f"{text}\n"
 
@@ -146,6 +192,36 @@ def wanted_outputs(family: Family) -> list[str]:
     return chosen + [name for name in offered if name not in chosen][: max(0, FEWEST_WANTED - len(chosen))]
 
 
+def goal_of(wanted: list[str]) -> str:
+    """Return the wanted output that is made small."""
+    return next((name for goal in GOALS for name in wanted if parts(name).stem.startswith(goal)), wanted[-1])
+
+
+def start_of(family: Family) -> Mapping[str, float]:
+    """Return the design to begin with: a start, or the example at the size of a machine [mm; SI; rad]."""
+    if family.name in STARTS:
+        return STARTS[family.name]
+    if len(family.stages) > 1:
+        own = {f"{name}{s.number}": x for s in family.stages for name, x in start_of(s.family).items()}
+        return own | _offsets(family, own)
+    scale, units = _scale(family), {p.name: p.unit for p in family.parameters}
+    return {name: x * scale ** POWER.get(units[name], 0) for name, x in family.example.items()}
+
+
+def _offsets(family: Family, start: Mapping[str, float]) -> dict[str, float]:
+    """Return the angles between the stages of a chain whose motion is large, and its pressure angles small."""
+    names, tried = [f"offset{s.number}" for s in family.stages[1:]], np.linspace(0.0, 2.0 * np.pi, OFFSETS, False)
+    offsets = dict(zip(names, map(np.ravel, np.meshgrid(*[tried] * len(names))), strict=True))
+    phi = np.linspace(0.0, 2.0 * np.pi, POSES, False)
+    loops = [loop.pressure_angle for loop in family.every(Assembly)]
+    poses = evaluate(_names(family), {**start, **offsets}, [family.position, *loops], phi=phi)
+    motion, *pressure = (poses[name].to_numpy().reshape(-1, POSES) for name in (family.position, *loops))
+    turns = family.pose_output[family.position].wraps
+    margin = np.min([np.cos(angles).min(axis=1) ** 2 for angles in pressure], axis=0, initial=1.0)
+    score = np.ptp(np.unwrap(motion) if turns else motion, axis=1) * margin
+    return {name: float(values[np.nan_to_num(score).argmax()]) for name, values in offsets.items()}
+
+
 def swept_names(family: Family) -> list[str]:
     """Return the first two swept dimensions: lengths that are not zero, or numbers if there are none."""
     example = family.example
@@ -157,18 +233,15 @@ def swept_names(family: Family) -> list[str]:
 def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | None = None) -> Iterator[str]:
     """Yield every parameter with its meaning: ``swept`` ones as ranges, those with a default as comments.
 
-    Values are those of the example, or of a design ``drawn`` [mm, rad].
+    Values are those of a start, or of a design ``drawn`` [mm, rad].
     """
-    example = family.example if drawn is None else drawn
-    given = {p.unit for p in family.parameters}
-    si = bool(given & {"mass", "force", "stiffness", "torque"})
-    units = OTHERS | (SI if si else LENGTHS)
-    scale = 1.0 if si or drawn is not None else _scale(family, example)
+    example = start_of(family) if drawn is None else drawn
+    units = OTHERS | (SI if _in_si(family) else LENGTHS)
     for p in family.parameters:
         value = example.get(p.name, p.default)
         assert value is not None  # an example has every required parameter
         unit = units.get(p.unit, "")
-        shown = math.degrees(value) if unit == "deg" else value * scale ** POWER.get(p.unit, 0)
+        shown = math.degrees(value) if unit == "deg" else value
         if p.name in swept:
             ends = sorted((shown * (1.0 - SPREAD), shown * (1.0 + SPREAD)))
             more = f', unit = "{unit}"' if unit else ""
@@ -179,9 +252,15 @@ def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | 
         yield f"{'# ' if left_out else ''}{entry}".ljust(WIDTH) + f" # {described(p, left_out=' if left out')}"
 
 
-def _scale(family: Family, example: Mapping[str, float]) -> float:
+def _in_si(family: Family) -> bool:
+    return not {p.unit for p in family.parameters}.isdisjoint({"mass", "force", "stiffness", "torque"})
+
+
+def _scale(family: Family) -> float:
     """Return the power of ten that scales the example, which has any unit, to the size of a machine."""
-    longest = max((abs(example.get(p.name, 0.0)) for p in family.parameters if p.unit == "length"), default=0.0)
+    if _in_si(family):
+        return 1.0
+    longest = max((abs(family.example.get(p.name, 0.0)) for p in family.parameters if p.unit == "length"), default=0.0)
     return 10.0 ** max(0, math.ceil(math.log10(LEAST_SIZE / longest))) if longest else 1.0
 
 

@@ -232,21 +232,6 @@ def test_run_report_and_resume(study: Path, tmp_path: Path) -> None:
     assert len(pd.read_parquet(tmp_path / "report" / "survivors.parquet")) == (sweep.load(out).status == 0).sum()
 
 
-def test_report_on_a_full_disk_does_not_speak_of_a_run(study: Path, tmp_path: Path) -> None:
-    out = tmp_path / "designs"
-    call("run", study, "--out", out, "--jobs", 1)
-
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Path, "write_bytes", full)
-        result = call("report", out)
-    assert result.exit_code == 74 and "run again" not in result.stderr
-    assert f"{tmp_path / 'report.html'}: cannot be written: No space left on device" in result.stderr
-    assert not list(tmp_path.rglob("_tmp-*"))
-
-
 def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     given = {}
 

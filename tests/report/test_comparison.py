@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -63,3 +64,15 @@ def test_another_mechanism_is_refused(folders, tmp_path):
     folder = sweep.run(other, out=tmp_path / "slider" / "designs", jobs=1)
     said = CliRunner().invoke(main, ["report", str(folders[0]), str(folder)])
     assert said.exit_code == 2 and "of the mechanism of" in said.output
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_report_on_a_full_disk_does_not_speak_of_a_run(folders, tmp_path, monkeypatch, count):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    said = CliRunner().invoke(main, ["report", *map(str, folders[:count]), "--out", str(tmp_path)])
+    page = tmp_path / ("report.html" if count == 1 else "comparison.html")
+    assert said.exit_code == 74 and f"{page}: cannot be written: No space left on device" in said.stderr
+    assert "run again" not in said.stderr and not list(tmp_path.rglob("_tmp-*"))

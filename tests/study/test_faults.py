@@ -218,9 +218,8 @@ def faults_of(text: str, folder: Path) -> list[str]:
         load_study(folder)
     assert caught.value.exit_code == 2
     assert str(caught.value).startswith(f"{folder / 'study.toml'}: {len(caught.value.faults)} fault")
-    faults = caught.value.faults
-    assert all(fault.startswith(f"{folder}/") for fault in faults)  # which of several studies it is
-    return [fault.removeprefix(f"{folder}/") for fault in faults]
+    assert all(fault.startswith(f"{folder}/") for fault in caught.value.faults)  # which of several studies it is
+    return [fault.removeprefix(f"{folder}/") for fault in caught.value.faults]
 
 
 def test_the_file_that_all_faults_are_put_into_has_none(tmp_path: Path) -> None:
