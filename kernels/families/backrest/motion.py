@@ -90,7 +90,8 @@ def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
     """Write the roots between phi_lo and phi_hi, ascending, into ``roots`` (at least MOST); return their number.
 
     The interval is cut into CELLS cells.  A cell with one undefined end is cut at the edge; a cell pair whose middle is
-    a dip towards zero is searched for a pair of roots, so that two close roots are not stepped over.
+    a dip towards zero is searched for a pair of roots, so that two close roots are not stepped over.  An equation that
+    is empty, zero everywhere, has none.
     """
     low, high = d[29].real, d[30].real
     count = 0
@@ -114,13 +115,13 @@ def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
             if f_dip * f1 <= 0.0:
                 count = _kept(roots, count, _bracketed(d, x0, f0, dip, f_dip, rho, mode))
                 count = _kept(roots, count, _bracketed(d, dip, f_dip, x2, f2, rho, mode))
-        elif (ok1 or ok2) and f_left == 0.0:
+        elif (ok1 or ok2) and f_left == 0.0 and f_right != 0.0:
             count = _kept(roots, count, left)
         elif (ok1 or ok2) and f_left * f_right < 0.0:
             count = _kept(roots, count, _bracketed(d, left, f_left, right, f_right, rho, mode))
         x0, f0, ok0 = x1, f1, ok1
         x1, f1, ok1 = x2, f2, ok2
-    if ok1 and f1 == 0.0:
+    if ok1 and f1 == 0.0 and f0 != 0.0:
         count = _kept(roots, count, x1)
     return count
 

@@ -218,6 +218,11 @@ def test_backrest_source_closure_of_a_pin_without_radius_has_no_root_where_its_r
     assert roots >= 1 and max(map(abs, reactions)) < 1e-8
 
 
+def test_backrest_equation_of_which_nothing_is_left_has_no_root():
+    got = one_pose(EXAMPLE | {"H": 0.0, "r0": 0.0, "phi_lo": -0.125, "phi_hi": 0.5}, 0.25, Mode.CLOSURE)
+    assert (got["roots"], got["status"]) == (0.0, st.NO_ROOT)
+
+
 def test_backrest_two_close_roots_are_not_stepped_over():
     base = {k: v for k, v in ROWS[-1]["in"].items() if k in FIELDS}
     base |= EXAMPLE | {"psi": 1.0, "phi_lo": -0.125, "phi_hi": 0.5, "s1": 1.0, "s2": 1.0}
