@@ -13,8 +13,9 @@ from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import EPS, Status
 from sweep.effects import load_effects, loads
+from sweep.effects.acceleration import NEEDED, NEEDED_NAMES, TARGET, balanced, extremes, rubbing_torque
 from sweep.effects.base import Advice, DesignResult, Effect
-from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
+from sweep.effects.load_passing import FRICTION, LOADS, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
@@ -50,8 +51,6 @@ RUBBING = (129, *FINER[1:])  # friction has kinks where the follower turns back:
 LEFT_OF_CURVE = 1e-4  # share of a curve that the grid may miss: more is a jump, beside which a series overshoots
 ROUNDED = 1024.0 * EPS  # share of speed^2 to which rounding may raise a zero acceleration; 324 was observed
 SUFFIX = ("", FRICTION_SUFFIX)  # of the outputs, without and with friction
-_NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
-_NEEDED = frozenset(_NEEDED_NAMES)
 
 # Friction grows with the loads, and these with the speed: it is iterated with the resulting speed.
 PASSES = 24
@@ -97,8 +96,8 @@ def _solve(rubs: bool, finest: int, grid: Scene, phi: Array, last: bool) -> tupl
 
 def samples(grid: Scene) -> tuple[Array, Array]:
     """Reduced inertia and torque excess J'w^2/2 - M_drive(w, 0): weights and load reduced to the crank."""
-    found = compute_loads(grid.even(), _NEEDED)
-    inertia, slope, drive = floats(found, *_NEEDED_NAMES)
+    found = compute_loads(grid.even(), NEEDED)
+    inertia, slope, drive = floats(found, *NEEDED_NAMES)
     speed = grid.inputs["speed"][:, None]
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
@@ -153,33 +152,19 @@ def _compute(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs:
     change = f"crank_acceleration{SUFFIX[rubs]}"
     if change in wanted:
         speed, even = (found[f"{name}{SUFFIX[rubs]}"] for name in ("crank_speed", "even_torque"))
-        found[change] = _balanced(scene, speed, found[change], even, rubs)
+        found[change] = balanced(scene, speed, even, rubs, np.zeros(len(even), np.uint8))
     return at_poses(scene, found, status, wanted)
-
-
-def _balanced(scene: Scene, speed: Array, change: Array, even: Array, rubs: bool) -> Array:
-    """Acceleration from the balance of torques at each pose: beside kinks of the loads a Fourier series is inaccurate.
-
-    ``even`` (n,) is the motor's torque at the mean speed; ``change`` is the acceleration at which friction is computed.
-    """
-    loads = compute_loads(scene.even(), _NEEDED)
-    inertia, slope, drive = floats(loads, *_NEEDED_NAMES)
-    mean, motor, flywheel = (scene.inputs[name][:, None] for name in ("speed", "motor_slope", "flywheel"))
-    left = even[:, None] - motor * (speed - mean) - drive + 0.5 * slope * (mean * mean - speed * speed)
-    if rubs:
-        left = left - _lost(scene, speed, change, np.zeros(len(mean), np.uint8))
-    found: Array = left / (inertia + flywheel)
-    return found
 
 
 def turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, rubs: bool = False) -> Columns:
     """Compute unevenness, extreme speeds and the reductions of speed and acceleration."""
-    return _refined(scene, rubs, partial(_turn, wanted=wanted, rubs=rubs))
+    return _refined(scene, rubs, partial(_turn, wanted=wanted, rubs=rubs, target=accuracy.target))
 
 
-def _turn(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bool) -> Columns:
-    suffix = SUFFIX[rubs]
-    found, status = _solved(scene, scene.on_grid(grids[-1]).angles.phi, rubs, grids)
+def _turn(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bool, target: float | None) -> Columns:
+    suffix, grid = SUFFIX[rubs], scene.on_grid(grids[-1])
+    curves = _outputs(suffix, "")
+    found, status = _solved(scene, grid.angles.phi, rubs, grids)
     columns: Columns = {f"{name}{suffix}": found[f"{name}{suffix}"] for name in ("unevenness", "fastest", "slowest")}
     one, fastest = np.ones(len(scene.designs)), found[f"fastest{suffix}"]
     known = found[f"energy_error{suffix}"]
@@ -192,12 +177,16 @@ def _turn(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs: bo
     torque = found[f"torque_error{suffix}"]
     if grids != GRIDS:
         torque = np.maximum(torque, PER_LEFT * found[f"missed{suffix}"])
-    change = f"crank_acceleration{suffix}"
+    change = curves[1].name
+    if rubs and any(name.endswith(f"_{change}") for name in wanted):
+        steady_state = (found[curves[0].name], found[change], found[f"even_torque{suffix}"])
+        columns |= extremes(grid, steady_state, known, curves[1], wanted, target or TARGET, status)
+        curves = curves[:1]
     size = np.abs(found[change]).max(axis=1)
     ratio = np.divide(fastest**2, size, out=one.copy(), where=size > 0.0)
     of_change = np.maximum(known, (torque + ROUNDED) * ratio)
     known_of = {change: of_change, f"crank_speed{suffix}": known * steep}
-    return per_turn(found, status, columns, _outputs(suffix, ""), wanted, limit, known, known_of)
+    return per_turn(found, status, columns, curves, wanted, limit, known, known_of)
 
 
 def _friction_loss(grid: Scene, slope: Array) -> tuple[Array, Status]:
@@ -226,12 +215,12 @@ def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, S
     mean, motor = grid.inputs["speed"], slope if slope.any() else None
     status = np.zeros(len(grid.designs), np.uint8)
     even = np.broadcast_to(mean[:, None], coarse.shape)
-    lost = _lost(coarse, even, np.zeros(coarse.shape), status)
+    lost = rubbing_torque(coarse, even, np.zeros(coarse.shape), status)
     phi = coarse.angles.phi
     for _ in range(PASSES):
         before = lost
         turning, change, code = _turning(inertia, excess - lost, mean, motor, phi)
-        lost = _lost(coarse, turning, change, status)
+        lost = rubbing_torque(coarse, turning, change, status)
         size = np.maximum(np.abs(excess).max(axis=1), np.abs(lost).max(axis=1))
         moved: NDArray[np.bool_] = np.asarray(np.abs(lost - before).max(axis=1) > SETTLED * size)
         if not moved.any():
@@ -240,7 +229,7 @@ def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, S
     if coarse is not grid:
         turning, change, code = _turning(inertia, excess - lost, mean, motor, grid.angles.phi)
         take_over(status, code)
-        lost = _lost(grid, turning, change, status)
+        lost = rubbing_torque(grid, turning, change, status)
     return lost, status, code
 
 
@@ -252,19 +241,6 @@ def _turning(
     usable = np.logical_and.reduce(np.isfinite(found["crank_speed"]), axis=1, keepdims=True)
     speed = np.where(usable, found["crank_speed"], mean[:, None])
     return speed, np.where(usable, found["crank_acceleration"], 0.0), status
-
-
-def _lost(grid: Scene, speed: Array, change: Array, status: Status) -> Array:
-    """Compute the driving torque with friction minus that without, at the given speed; update ``status``."""
-    turning = Scene(
-        grid.family, grid.designs, grid.angles, grid.inputs, grid.after, curves=grid.curves, uneven=(speed, change)
-    )
-    rubbing = compute_friction(turning, frozenset({"drive_torque_friction"}))
-    smooth = compute_loads(turning, frozenset({"drive_torque"}))
-    worst = np.asarray(rubbing["status"], np.uint8).max(axis=1)
-    np.copyto(status, worst, where=status == st.OK)
-    with_friction = np.asarray(rubbing["drive_torque_friction"], np.float64)
-    return with_friction - np.asarray(smooth["drive_torque"], np.float64)
 
 
 def advise(scene: Scene) -> Advice | None:

@@ -13,6 +13,9 @@ from scipy.optimize import brentq
 
 import sweep
 from kernels import status as st
+from studies.accuracy.ordinary import designs as ordinary
+from sweep.effects import extended
+from sweep.families import family
 from tests.effects.test_tool import DRIVE, GUIDE
 
 N = 64
@@ -251,3 +254,30 @@ def test_errors_of_the_speed_of_a_cam_see_what_the_harmonics_of_its_kinks_add_up
     for name, value in exact.items():
         assert abs(found[name] - value) <= found[f"err_{name}"] + 1e-8 * value, name
     assert found.err_max_crank_acceleration < 0.1 * change.max() and found.err_unevenness < 1e-6
+
+
+REDUCED = ("max", "min", "max_abs", "range", "rms")
+
+
+@pytest.mark.parametrize("name", ["slider_crank", "rssp", "four_bar"])
+def test_extremes_of_an_acceleration_that_jumps_are_those_of_its_poses(name):
+    """A series of the turn resolves no jump: half of ordinary slider-cranks had no acceleration with friction."""
+    change = "crank_acceleration_friction"
+    places = [f"phi_{kind}_{change}" for kind in REDUCED[:3]]
+    full = extended(family(name), [change])
+    rows = ordinary(full, 6, seed=1)
+    table = dict(zip(full.parameter_names, rows.T, strict=True))
+    found = sweep.summarise(name, table, [*(f"{kind}_{change}" for kind in REDUCED), *places], accuracy=1e-8)
+    turning = np.flatnonzero(~found.status.isin([st.JAMMED, st.NOT_ASSEMBLED, st.NOT_ROTATABLE]))
+    assert turning.size > 3 and (found.status[turning] == st.OK).all()
+    at = np.concatenate([found[place].to_numpy()[:, None] + [-1e-6, 0.0, 1e-6] for place in places], axis=1)
+    for row in turning:
+        design = {key: column[row] for key, column in table.items()}
+        phi = np.concatenate([2.0 * np.pi * np.arange(4001) / 4001, at[row]])
+        poses = sweep.evaluate(name, design, [change], phi=phi)[change].to_numpy()
+        size, even = np.abs(poses).max(), poses[:4001]
+        exact = (poses.max(), poses.min(), size, np.ptp(poses), np.sqrt(np.mean(even * even)))
+        for kind, value in zip(REDUCED, exact, strict=True):
+            off = abs(found[f"{kind}_{change}"][row] - value)
+            assert off <= found[f"err_{kind}_{change}"][row] + 1e-5 * size
+            assert found[f"err_{kind}_{change}"][row] < 1e-2 * size
