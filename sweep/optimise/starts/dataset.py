@@ -188,6 +188,7 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
     The designs have the signs of ``base`` (P,); fewer are measured if they are slow.
     """
     rng, number, seconds = np.random.default_rng(0), 0, 0.0
+    ranking(problem, base[None])  # compiles
     for number in TIMED:
         designs = problem.placed(base, rng.random((number, len(problem.variables))))
         start = time.process_time()
