@@ -16,7 +16,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Bends, Singular, Switches, about, bends
+from sweep.families.curve_features import Bends, Singular, about, bends
 from sweep.numerics.chebyshev import NODES
 from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, Curves, Top, climbed, fitted, measured, places
 from sweep.quantities.kinds import Request
@@ -41,11 +41,7 @@ STEADY = 10.0 * AGAIN  # times EPS of a value: largest error claimed for a curve
 def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
     """Whether an extremum is searched on panels; with ``jumps`` all curves of these designs may jump."""
     output = family.pose_output[request.pose]
-    if output.wraps:  # samples find the heights of an angle, but not how long it dwells
-        kinked = request.place and bool(about(family, Switches, (request.pose,)))
-    else:
-        kinked = output.kinks or output.jumps or jumps
-    return kinked and not request.windowed
+    return (output.kinks or output.jumps or jumps) and not (output.wraps or request.windowed)
 
 
 def extrema(

@@ -10,7 +10,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Singular, about, switches
+from sweep.families.curve_features import Singular, Switches, about, switches
 from sweep.numerics.records import joined, only, put
 from sweep.numerics.singularities import Singularities
 from sweep.numerics.ties import first_of_equals
@@ -89,7 +89,7 @@ class Search:
         self.near = nearest(self.family, self.designs, curves, MATTERS) if sharp else None
         fewest = (START * denser(self.family, self.designs, self.names, self.near)).astype(np.int64)
         self.undone = np.tile(fewest, (len(self.requests), 1))
-        self.torn = np.zeros(self.undone.shape, np.bool_)  # curves with (near) jumps, to be searched on panels
+        self.torn = np.zeros(self.undone.shape, np.bool_)  # (near) jumps and dwells, to be searched on panels
         if self.near is not None and not self.anywhere:
             broken(self.family, self.designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
@@ -346,4 +346,7 @@ class Search:
             phi, err_phi = refine.polished(self.family, self.designs[rows[has]], slope, phi, err_phi)
         found.phi[rows[has]] = np.mod(phi, TWO_PI)
         found.err_phi[rows[has]] = err_phi
+        if located and not request.windowed and about(self.family, Switches, (request.pose,)):
+            dwells = refine.dwells(self.family, self.designs[rows[has]], request.pose, phi)
+            self.torn[self.requests.index(request), rows[has]] |= dwells
         return moved

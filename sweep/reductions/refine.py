@@ -11,7 +11,7 @@ from kernels.curves import samples as scan
 from kernels.types import EPS
 from sweep.families.base import Array, Family
 from sweep.numerics.records import only, put
-from sweep.reductions.sampling import Index, pose_columns
+from sweep.reductions.sampling import Index, Mask, pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: values (k, m), times their signs, of candidates (k,) at the angles phi (k, m)."""
@@ -31,6 +31,7 @@ RIPPLE = 0.25  # error per fourth difference, which is eight times the noise of 
 BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences relative to the largest, of first and of later samples
 LEARNT = 0.8  # largest share of the previous error that a narrower window about a kink leaves
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # steps of the last windows relative to the samples' spacing
+BESIDE = 1e-3 * np.array([-2.0, -1.0, 1.0, 2.0])  # poses next to a place [rad]: two alike show a dwell
 VARIES = 8.0  # ratio of the rounding at neighbouring poses to that at one pose, at most
 
 
@@ -233,6 +234,14 @@ def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Ar
         return pose_columns(precise, designs[active], angles, [slope])[0][slope]
 
     return polish_places(sample, phi, err_phi)
+
+
+def dwells(family: Family, designs: Array, pose: str, phi: Array) -> Mask:
+    """Whether a curve is level beside its extremum, one of each design: panels show how far the dwell extends."""
+    values = pose_columns(family.precise(), designs, phi[:, None] + BESIDE, [pose])[0][pose]
+    change, size = np.abs(values[:, ::3] - values[:, 1:3]), np.abs(values).max(axis=1, keepdims=True)
+    level: Mask = (change <= 16.0 * EPS * size).any(axis=1)
+    return level
 
 
 def _kink(values: Array, bent: float) -> Array:

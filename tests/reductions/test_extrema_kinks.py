@@ -234,6 +234,27 @@ def test_the_place_of_a_levers_dwell_errs_by_its_whole_length(start, branch, cha
     assert found.err_phi0 == pytest.approx(found.err_phi_ext + found.err_phi_fold)
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.4])
+def test_places_of_what_rests_with_a_lever_err_by_the_whole_dwell(offset):
+    """A slider that follows a lever, a point on it and that point's speed: errors were 1e-7 to 1e-3 rad."""
+    slider = {"a": 1.0, "b": 3.0, "e": 0.4, "offset": 0.3}
+    chain = {f"{name}1": x for name, x in (LEVER | {"start": -offset}).items()} | {
+        f"{k}2": x for k, x in slider.items()
+    }
+    ends = sweep.summarise(["cam_lever", "slider_crank"], chain, ["phi_max_s", "phi_min_s"], accuracy=1e-8)
+    member = {"family": "cam_lever", "tip": [1.0, 2.0, 0.5], "offset": offset}
+    machine = sweep.machine({"lever": member}, {"pace": {"speed": ["lever.tip"]}})
+    names = ["lever.phi_max_tip_x", "lever.phi_min_tip_x", "phi_min_pace"]
+    tips = sweep.summarise(machine, {f"lever.{k}": x for k, x in LEVER.items()}, names, accuracy=1e-8)
+    assert ends.status[0] == tips.status[0] == st.OK
+    for name, found in [*((name, ends) for name in ("phi_max_s", "phi_min_s")), *((name, tips) for name in names)]:
+        away = [np.mod(found[name][0] + offset - begins + 0.1, 2.0 * np.pi) - 0.1 for begins in (1.0, 3.0)]
+        which = int(not -1e-3 <= away[0] <= 0.7 + 1e-3)
+        long = (0.7, 2.0 * np.pi - 3.0)[which]
+        assert -1e-3 <= away[which] <= long + 1e-3, name
+        assert max(away[which], long - away[which]) <= found[f"err_{name}"][0] + 1e-3, name
+
+
 def test_a_rest_at_zero_is_one_hill_although_rounding_falls_below_it_behind_its_end():
     """The cycloidal rise begins with -1e-18: the place was the end of the rest, with an error of 2e-4 rad."""
     cams = {"lift": [0.3, 0.4, 0.5], "rise": [1.1, 1.5, 0.9], "dwell": [0.7, 0.4, 1.2], "fall": [1.2, 1.3, 1.1]}
