@@ -84,10 +84,11 @@ def reductions(
     largest, phi_largest, least, phi_least, rms, missed = (np.empty(n) for _ in range(6))
     turn_extremes(np.ascontiguousarray(values), largest, phi_largest, least, phi_least, rms, missed)
     status[(status == st.OK) & ~(missed < limit)] = st.NOT_CONVERGED
-    upward = np.abs(largest) >= np.abs(least)
     size = np.maximum(np.abs(largest), np.abs(least))
     # The curve is as accurate as the steady state that it comes from.
     err = (missed + known) * size
+    # Of a top and a bottom as far from zero within their errors the first in the turn counts.
+    upward = np.where(np.abs(largest + least) <= 2.0 * err, phi_largest <= phi_least, largest >= -least)
     found = {
         "max": (largest, err),
         "min": (least, err),

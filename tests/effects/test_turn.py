@@ -46,6 +46,18 @@ def test_root_mean_square_of_what_does_not_turn_is_nan_with_a_status():
     assert list(np.isnan(got["rms_drive_torque"])) == [False, True, False]
 
 
+def test_the_place_of_an_acceleration_as_large_as_the_deceleration_is_the_first_of_both():
+    """An unbalanced cam rises and falls alike; rounding chose one of both places, half a turn apart."""
+    cam = {name: np.full(12, x) for name, x in family("free_cam").example.items()}
+    angle = np.linspace(0.1, 6.2, 12)
+    cam |= {"m_cam": np.full(12, 1e-3), "com_cam_x": 5.0 * np.cos(angle), "com_cam_y": 5.0 * np.sin(angle)}
+    cam |= {"gravity_y": np.full(12, -9810.0), "speed": np.full(12, 50.0), "flywheel": np.full(12, 1e3)}
+    found = sweep.summarise("free_cam", cam, ["phi_max_abs_crank_acceleration"])
+    assert (found["status"] == st.OK).all()
+    # the weight's torque is largest where its centre is level with the axis
+    np.testing.assert_allclose(found["phi_max_abs_crank_acceleration"], np.mod(-angle, np.pi), atol=1e-4)
+
+
 @pytest.mark.parametrize("output", ["lag_dynamic", "elongation_dynamic", "crank_speed", "crank_acceleration"])
 def test_reductions_of_whole_turn_effects_equal_dense_grids(output):
     bases = ("max", "min", "max_abs", "range", "rms", "phi_max_abs")
