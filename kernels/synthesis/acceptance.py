@@ -152,10 +152,8 @@ def _at_limit(designs: Array, i: int, psi: float, phi: float, rates: Array, plac
     direct_y = (0.0, 0.0, ca * s, 0.0, 0.0, -sa, -ze)
     for p in range(7):
         dpsi = -h[p] / ct
-        rates[i, p, place] = dpsi
-        rates[i, p, place + 1] = (
-            xc * (direct_y[p] + c * ca * co * dpsi) - yc * (direct_x[p] - c * s * dpsi)
-        ) / rho2  # fmt: skip
+        turned = xc * (direct_y[p] + c * ca * co * dpsi) - yc * (direct_x[p] - c * s * dpsi)
+        rates[i, p, place], rates[i, p, place + 1] = dpsi, turned / rho2
 
 
 @kernel
