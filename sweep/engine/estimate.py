@@ -252,5 +252,5 @@ def duration(seconds: float) -> str:
         if 0.0 < seconds < below:
             return f"{float(f'{seconds / below * 1e3:.3g}'):g} {unit}"
     if seconds < 120.0:
-        return f"{seconds:.2g} s"
+        return f"{float(f'{seconds:.2g}'):g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"

@@ -19,7 +19,16 @@ from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset
 from sweep.report.front import Front
 from sweep.report.quantities import Quantity, change, number, quantity, rpm
-from sweep.report.tables import LimitState, fates, limit_state, limit_states, limited, parameter_rows, value_of
+from sweep.report.tables import (
+    ACTIVE,
+    LimitState,
+    fates,
+    limit_state,
+    limit_states,
+    limited,
+    parameter_rows,
+    value_of,
+)
 
 if TYPE_CHECKING:
     from sweep.optimise.multistart.survey import Survey
@@ -98,7 +107,7 @@ def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
 def _limit_sentences(states: list[LimitState], robust: bool) -> list[str]:
     """Return sentences about active and inactive limits; a robust design keeps the margin that its tolerances need."""
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
-    met = sorted((s for s in states if s.state == "met" and s.slack), key=lambda s: s.room)
+    met = sorted((s for s in states if s.state == "met" and s.room > ACTIVE), key=lambda s: s.room)
     slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in met[:NEAREST]]
     slack += [f"{len(met) - NEAREST} more"] if len(met) > NEAREST else []
     words = f"the active limit{'s' if len(active) > 1 else ''}"

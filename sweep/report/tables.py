@@ -12,6 +12,7 @@ from kernels import status as codes
 from sweep.errors import how_many
 from sweep.evaluation.statuses import meaning
 from sweep.families.names import error_of, is_flag, is_place, without_minus
+from sweep.optimise.local.descent import KKT
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Row
 from sweep.report.quantities import Quantity, change, number, quantity
@@ -49,9 +50,14 @@ def limited(data: Dataset, name: str) -> Quantity:
 
 
 def limit_state(
-    limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str]
-) -> LimitState:
-    """Return whether a design keeps a limit, and its distance from it."""
+    limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str],
+    settled: bool = False,
+) -> LimitState:  # fmt: skip
+    """Return whether a design keeps a limit, and its distance from it.
+
+    A search that has ``settled`` says which limits hold the objective back; an output that does not matter to it may
+    have stopped at a bound, too.
+    """
     value, other = value_of(row, limit.output), value_of(reference, limit.output)
     if is_flag(limit.output):
         words = {1.0: "yes", 0.0: "no"}
@@ -68,7 +74,7 @@ def limit_state(
         state = "unknown"
     elif room < -tolerance:
         state = "missed"
-    elif room <= tolerance or limit.output in active_names:
+    elif limit.output in active_names or (room <= tolerance and (limit.is_equation or not settled)):
         state = "active"
     else:
         state = "met"
@@ -100,8 +106,12 @@ def bound_words(limit: Limit, shown: Quantity) -> str:
 def limit_states(data: Dataset) -> list[LimitState]:
     """Return the state of every limit at the result of the study."""
     row = data.result
-    active = frozenset(data.active)
-    return [limit_state(x, row, data.reference, limited(data, x.output), active) for x in data.study.limits]
+    active, parameters = frozenset(data.active), data.study.family.parameter_names
+    settled = data.optimum is not None and value_of(data.optimum, "kkt_residual") <= KKT
+    return [
+        limit_state(x, row, data.reference, limited(data, x.output), active, settled and x.output not in parameters)
+        for x in data.study.limits
+    ]
 
 
 def value_of(row: Row | None, name: str) -> float:

@@ -10,8 +10,11 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
+from sweep.quantities.limits import Limit
 from sweep.report.answer import share_words
 from sweep.report.page import write_report
+from sweep.report.quantities import quantity
+from sweep.report.tables import limit_state
 from sweep.report.terminal import held_back
 from tests.optimise.test_study import STUDY
 
@@ -53,6 +56,17 @@ def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
     assert held_back(["swing"], "converged") == "swing"
     assert held_back([], "looks") == "the number of evaluations (optimise.looks), which ended its search"
     assert held_back(["swing"], "looks") == "swing; the number of evaluations (optimise.looks), which ended its search"
+
+
+def test_output_that_stopped_at_a_bound_but_does_not_matter_holds_nothing_back() -> None:
+    """A looper's acceleration was said to be held back by the stroke of the needle."""
+    limit, row, shown = Limit("stroke", 22.0, 26.0), {"stroke": 22.0}, quantity("stroke", "mm")
+    none: frozenset[str] = frozenset()
+    assert limit_state(limit, row, None, shown, none, settled=True).state == "met"
+    assert limit_state(limit, row, None, shown, frozenset(["stroke"]), settled=True).state == "active"
+    assert limit_state(limit, row, None, shown, none).state == "active"  # nobody says what matters
+    assert limit_state(Limit("stroke", 22.0, 22.0), row, None, shown, none, settled=True).state == "active"
+    assert limit_state(limit, {"stroke": 21.0}, None, shown, none, settled=True).state == "missed"
 
 
 def test_a_share_that_is_less_than_what_was_asked_says_so_and_why() -> None:

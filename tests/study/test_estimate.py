@@ -12,7 +12,7 @@ import pytest
 
 from sweep.chunks.cascade import ordered_routes
 from sweep.costs import nanoseconds
-from sweep.engine.estimate import check_budget, estimate, other_accuracies, searches
+from sweep.engine.estimate import check_budget, duration, estimate, other_accuracies, searches
 from sweep.engine.run import run
 from sweep.errors import BudgetError
 from sweep.evaluation.tables import design_matrix
@@ -199,6 +199,10 @@ def test_price_of_searches_that_converge_is_that_of_the_looks_they_take(monkeypa
     assert found["search"] == pytest.approx((3 * 0.025, 3 * looks * 1e-3))
     # Four rounds from each of three starts, and forty from each end at most, of 25 looks of 1 ms.
     assert found["tolerances"] == pytest.approx(((3 * 4 + 3 * 40) * 0.025, 2 * (3 * 4 * 400 + 3 * looks) * 1e-3))
+
+
+def test_a_time_is_written_out() -> None:
+    assert [duration(x) for x in (99.7, 104.0, 119.0, 9.96, 150.0)] == ["100 s", "100 s", "120 s", "10 s", "2.5 min"]
 
 
 def test_disk_of_a_small_study_is_that_of_a_run(tmp_path: Path) -> None:
