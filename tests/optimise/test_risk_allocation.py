@@ -186,3 +186,24 @@ def test_one_number_for_all_limits_would_cost_more(monkeypatch: pytest.MonkeyPat
     assert share == pytest.approx(SHARE, abs=0.002)
     assert cost == pytest.approx((DEAR + 1.0) * TOGETHER, abs=0.02 * (DEAR + 1.0))
     assert cost > 1.05 * price((DEAR, 1.0), best((DEAR, 1.0)))
+
+
+def test_a_design_that_a_correction_leaves_as_it_is_is_not_sampled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    approached, sample, sampled, standing = robust_search._margin_rounds, robust_search.sampled_designs, [], []
+
+    def stands_still(*given: Any) -> Any:
+        if not standing:
+            result, radius, step = approached(*given)
+            standing.append((replace(result, ended="looks"), radius, step))
+        return standing[0]
+
+    def noted(family: Family, design: np.ndarray, *given: Any) -> np.ndarray:
+        sampled.append(tuple(design))
+        return sample(family, design, *given)
+
+    monkeypatch.setattr(robust_search, "_margin_rounds", stands_still)
+    monkeypatch.setattr(robust_search, "sampled_designs", noted)
+    settings = OptimiseSettings(starts=1, seed=5)
+    drawing = minimise(PROBLEM, PROBLEM.rows(np.array([[0.7, 0.8]])), settings)
+    assert robust(PROBLEM, drawing, TOLERANCE, settings) is not None
+    assert len(sampled) == 1

@@ -230,8 +230,10 @@ class _Calibrate:
                 result, radius, step = _margin_rounds(
                     scatter, initial.start, design, levels, should_stop, ROUNDS, budget, radius
                 )
-                design, spent = result.design, spent + result.looks
-                values, share = self._sampled_outputs(design)
+                spent += result.looks
+                if not np.array_equal(result.design, design):
+                    design = result.design
+                    values, share = self._sampled_outputs(design)
             value = best.result.objective  # negative if an output is maximised
             gain = (value - result.objective) / (abs(value) or 1.0) if best.share >= wanted else math.inf
             better = share >= wanted and gain > 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -179,16 +180,23 @@ def sampled_designs(family: Family, design: Array, tolerance: Tolerance, seed: i
     seed : seed of the scrambled Sobol sequence
     samples : a power of two
     """
+    sigma = tolerances_of(family, design, tolerance) / SIGMAS
+    varied = np.flatnonzero(sigma)
+    designs = np.repeat(design[None, :], samples, axis=0)
+    designs[:, varied] += sigma[varied] * _deviates(len(varied), seed, samples)
+    return designs
+
+
+@lru_cache(maxsize=2)  # designs of one search have the same sample around them, and tables a smaller one
+def _deviates(dimensions: int, seed: int, samples: int) -> Array:
+    """Return standard normal deviates (samples, dimensions) from a scrambled Sobol sequence."""
     from scipy.special import ndtri
     from scipy.stats import qmc
 
-    sigma = tolerances_of(family, design, tolerance) / SIGMAS
-    varied = np.flatnonzero(sigma)
-    uniform = qmc.Sobol(len(varied), seed=seed).random(samples)
-    designs = np.repeat(design[None, :], samples, axis=0)
+    uniform = qmc.Sobol(dimensions, seed=seed).random(samples)
     # A sample at 0 would give an infinite deviation.
-    designs[:, varied] += sigma[varied] * ndtri(np.maximum(uniform, 0.5 / samples))
-    return designs
+    deviates: Array = ndtri(np.maximum(uniform, 0.5 / samples))
+    return deviates
 
 
 def tolerance_rows(
