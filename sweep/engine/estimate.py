@@ -142,7 +142,6 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     seconds = (time.process_time() - begin) / max(trial.looks, 1) / jobs
     settled = trial.looks if trial.ended == "converged" else None
     typical, most = min(settings.looks, settled or TYPICAL_LOOKS) * seconds, settings.looks * seconds
-    share = None if study.tolerance is None else study.tolerance.robust
     population = POPULATION_LOOKS * seconds if settings.by_populations else 0.0
     if settings.by_populations:
         longest = settings.populations * (population + 2.0 * most) + settings.starts // SWEPT * most
@@ -153,7 +152,7 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
         expected = 0.0 if len(known.kept) else sample
         all_samples = -(-SAMPLES * settings.starts // GROUP_SIZE) * sample
         rows = [("search", expected + settings.starts * typical, all_samples + settings.starts * most)]
-    if study.tolerance is not None and share is not None:
+    if study.wanted_yield is not None:
         expected, longest = (n * seconds + POPULATIONS * population for n in _robust_looks(settings, settled))
         rows.append(("tolerances", expected, 2.0 * longest))
     if study.pareto is not None:

@@ -38,7 +38,7 @@ def stages_of(study: Study) -> tuple[str, ...]:
     """List the stages of a run in order, by the labels of its progress."""
     labels, settings = ["compiling", "planning", study.name], study.optimise
     if settings is not None:
-        robust = study.tolerance is not None and study.tolerance.robust is not None
+        robust = study.wanted_yield is not None
         optional = {"search": True, "tolerances": settings.by_populations and robust, "robust design": robust}
         optional |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
         labels += [name for name, wanted in optional.items() if wanted]

@@ -103,12 +103,15 @@ def _optimum(data: Dataset) -> list[str]:
     words = [w.strip() for w in str(data.optimum.get("active") or "").split(";")]
     held += [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
     share = float(data.optimum.get("yield", math.nan))
-    wanted_yield = None if data.study.tolerance is None else data.study.tolerance.robust
     ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
     return [
         f"optimum: {objective.words} {objective.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {held_back(held, ended)}",
-        *([f"as it is made: {share_words(share, wanted_yield, ended, agree)}"] if math.isfinite(share) else []),
+        *(
+            [f"as it is made: {share_words(share, data.study.wanted_yield, ended, agree)}"]
+            if math.isfinite(share)
+            else []
+        ),
     ]
 
 

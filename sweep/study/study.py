@@ -199,6 +199,11 @@ class Study:
         return tuple(x for k, x in enumerate(held) if x.output in [other.output for other in held[:k]])
 
     @property
+    def wanted_yield(self) -> float | None:
+        """Share of manufactured mechanisms that must keep the limits; None if that of the nominal design does."""
+        return None if self.tolerance is None else self.tolerance.robust
+
+    @property
     def made(self) -> tuple[str, ...]:
         """Parameters that [locus] or [fit] determines."""
         links = () if self.locus is None else self.locus.made
