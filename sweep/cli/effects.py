@@ -171,9 +171,9 @@ def needed(group: Iterable[Effect]) -> list[str]:
     return list(dict.fromkeys(n.removeprefix(f"{e.families[0]}_") for e in group for n in e.needs))
 
 
-def link_lists(group: Sequence[Effect]) -> dict[tuple[Place, ...], list[Effect]]:
+def link_lists(group: Sequence[Effect]) -> dict[tuple[TreePlace, ...], list[Effect]]:
     """Return the links and joints of the effects of a group, with the effects that share them."""
-    alike: dict[tuple[Place, ...], list[Effect]] = {}
+    alike: dict[tuple[TreePlace, ...], list[Effect]] = {}
     for entry in group:
         alike.setdefault(tuple(places_of(entry)), []).append(entry)
     return alike
@@ -224,7 +224,7 @@ def shared_inputs(groups: Iterable[Sequence[Effect]]) -> Rows:
     return [row for row, n in count.items() if n > 1]
 
 
-class Place(NamedTuple):
+class TreePlace(NamedTuple):
     """A link, ``B``, or a joint, ``J``: kind, name, axes or what acts on what, and patterns for any such place."""
 
     sign: str
@@ -234,19 +234,19 @@ class Place(NamedTuple):
     general: tuple[tuple[str, str], ...]
 
 
-def places(tree: LinkTree, touching: bool = False) -> list[Place]:
+def places(tree: LinkTree, touching: bool = False) -> list[TreePlace]:
     """Return the links and the joints of a link tree, or the joints with a contact only."""
-    rods, listed = rods_of(tree), list[Place]()
+    rods, listed = rods_of(tree), list[TreePlace]()
     for k, b in enumerate(tree.bodies):
         listed.append(link("slender" if b.slender else "rod" if k in rods else "compact", b.name, b.axes))
     for j in tree.joints:
         acting = re.escape(f"of the {j.acts}"), "of its first link on the second"
         general = (f"(?<!of the ){re.escape(j.text)}", "joint J"), acting
-        listed.append(Place("J", j.touch if touching else j.kind, j.name, j.acts, general))
+        listed.append(TreePlace("J", j.touch if touching else j.kind, j.name, j.acts, general))
     return [place for place in listed if place.sign == "J" and place.kind] if touching else listed
 
 
-def places_of(entry: Effect) -> list[Place]:
+def places_of(entry: Effect) -> list[TreePlace]:
     """Return the links and joints that rows of an effect are about; of a stage of one kind its links alone."""
     if entry.tree is not None:
         return places(entry.tree, entry.key == CONTACT)
@@ -256,13 +256,13 @@ def places_of(entry: Effect) -> list[Place]:
     return [link("rod" if f"rod_{body}" in texts else "compact", body, axes[body]) for body in bodies]
 
 
-def link(kind: str, name: str, axes: str) -> Place:
+def link(kind: str, name: str, axes: str) -> TreePlace:
     """Return a link with the patterns of rows about it."""
     named = (rf"_{name}\b", "_B"), (rf"\bof (?:the )?{name}\b", "of link B")
-    return Place("B", kind, name, axes, ((re.escape(f"({axes})"), "along its axes"), *named))
+    return TreePlace("B", kind, name, axes, ((re.escape(f"({axes})"), "along its axes"), *named))
 
 
-def _generalised(known: Sequence[Place], row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
+def _generalised(known: Sequence[TreePlace], row: tuple[str, str, str]) -> tuple[str, str, tuple[str, str, str]] | None:
     """Return sign and kind of a row's link or joint, and the row for any of them; None for a row about none."""
     for place in known:
         name = re.sub(rf"_{place.name}(?={OF_PLACE}(?:,|$))", f"_{place.sign}", row[0], count=1)
@@ -274,7 +274,7 @@ def _generalised(known: Sequence[Place], row: tuple[str, str, str]) -> tuple[str
     return None
 
 
-def of_any_place(known: Sequence[Sequence[Place]], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
+def of_any_place(known: Sequence[Sequence[TreePlace]], tables: Sequence[Rows]) -> tuple[Rows, list[Rows]]:
     """Return the rows that all links or joints of some kinds share, in general form, and each effect's other rows."""
     every = Counter((place.sign, place.kind) for places in known for place in places)
     generalised = [[_generalised(places, row) for row in table] for places, table in zip(known, tables, strict=True)]

@@ -38,7 +38,7 @@ UNSEEN = "a run takes it as finished; move it away, then the next run computes i
 
 
 @dataclass(frozen=True)
-class Finding:
+class DatasetFault:
     """A fault of a dataset, and what ``sweep run`` will do about it.
 
     ``damage`` is False for parts that are only missing because a run has not ended.
@@ -62,12 +62,12 @@ class Verification:
     rows: int = 0
     size: int = 0
     recomputed: int = 0
-    findings: list[Finding] = field(default_factory=list)
+    findings: list[DatasetFault] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
     def add(self, path: Path, words: str, remedy: str, damage: bool = True) -> None:
         """Add a fault to the findings."""
-        self.findings.append(Finding(path, words, remedy, damage))
+        self.findings.append(DatasetFault(path, words, remedy, damage))
 
     @property
     def exit_code(self) -> int:

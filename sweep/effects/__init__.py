@@ -12,7 +12,7 @@ from functools import lru_cache, partial
 from importlib import import_module
 from types import MappingProxyType
 
-from sweep.effects.base import CURVED, Effect, Placed
+from sweep.effects.base import CURVED, Effect, PlacedEffect
 from sweep.effects.evaluation import Added, bent, effect_poses, features, on_own_columns, run_design
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
@@ -112,7 +112,7 @@ def serving(family: Family) -> tuple[Effect, ...]:
 
 
 @of_family
-def applicable(family: Family) -> tuple[Placed, ...]:
+def applicable(family: Family) -> tuple[PlacedEffect, ...]:
     """Effects of a family or of the stages of a chain, in the order of the register.
 
     A later stage of a chain turns unevenly; an effect whose load includes that of later stages needs them all to return
@@ -120,7 +120,7 @@ def applicable(family: Family) -> tuple[Placed, ...]:
     """
     stages = family.stages
     found = [
-        Placed(entry, k, stage.tail, k == len(stages) - 1)
+        PlacedEffect(entry, k, stage.tail, k == len(stages) - 1)
         for k, stage in enumerate(stages)
         for entry in serving(stage.family)
         if not (k > 0 and entry.even_crank)
@@ -132,7 +132,7 @@ def applicable(family: Family) -> tuple[Placed, ...]:
     )
 
 
-def called_for(family: Family, wanted: Iterable[str]) -> tuple[Placed, ...]:
+def called_for(family: Family, wanted: Iterable[str]) -> tuple[PlacedEffect, ...]:
     """Effects that provide some wanted output or the output of a wanted reduction, in the order of the register."""
     # max_abs_force_d needs force_d; outputs of the family itself need no effect, so that none is imported.
     asked = (reduced(name, family.domain) for name in wanted)
@@ -150,18 +150,18 @@ def _effect_names(family: Family) -> frozenset[str]:
     return frozenset(o.name for placed in applicable(family) for o in placed.outputs)
 
 
-def _carriers(family: Family, placed: Placed) -> list[Placed]:
+def _carriers(family: Family, placed: PlacedEffect) -> list[PlacedEffect]:
     """Effects of the later stages that return the load on this one."""
     key = placed.entry.takes_load
     return [
-        Placed(entry, k, stage.tail, False)
+        PlacedEffect(entry, k, stage.tail, False)
         for k, stage in enumerate(family.stages)
         for entry in serving(stage.family)
         if key and k > placed.stage and entry.key == key
     ]
 
 
-def _handing(family: Family, placed: Placed) -> list[Placed]:
+def _handing(family: Family, placed: PlacedEffect) -> list[PlacedEffect]:
     """Effects of all later stages that return the load on this one; empty if one of these stages has none."""
     found = _carriers(family, placed)
     return found if len(found) == len(family.stages) - 1 - placed.stage else []
@@ -208,7 +208,9 @@ def elsewhere(family: Family, name: str) -> str:
     plain = reduced(name, family.domain)
     if isinstance(family, Chain):
         plain |= {stem(about) for about in plain}
-    others = [entry for entry in map(effect, NAMES) if not plain.isdisjoint(o.name for o in Placed(entry).outputs)]
+    others = [
+        entry for entry in map(effect, NAMES) if not plain.isdisjoint(o.name for o in PlacedEffect(entry).outputs)
+    ]
     if not others:
         return ""
     words = ", ".join(f"{entry.name} ({', '.join(entry.families)})" for entry in others)
@@ -269,7 +271,7 @@ def asked_of_machine(machine: Machine, wanted: Iterable[str]) -> set[str]:
     return names
 
 
-def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
+def with_effects(family: Family, effects: tuple[PlacedEffect, ...], curves: Mapping[str, Curve] = NO_CURVES) -> Family:
     """Add the outputs and inputs of the given effects to a family."""
     if not effects:
         return family
@@ -299,10 +301,10 @@ def with_effects(family: Family, effects: tuple[Placed, ...], curves: Mapping[st
     )
 
 
-def _felt(family: Family, effects: tuple[Placed, ...], name: str) -> frozenset[str]:
+def _felt(family: Family, effects: tuple[PlacedEffect, ...], name: str) -> frozenset[str]:
     """Names of the pose outputs that depend on an input, also through the load of a later stage."""
 
-    def takes(source: Placed) -> bool:
+    def takes(source: PlacedEffect) -> bool:
         own = at_stage(name, source.number) if source.number else name
         return any(p.name == own for p in source.entry.inputs_of(family.stages[source.stage].family))
 
@@ -314,7 +316,7 @@ def _design_ns(entry: Effect, accuracy: Accuracy) -> float:
     return entry.ns_per_design
 
 
-def inputs(family: Family, effects: Iterable[Placed]) -> tuple[Parameter, ...]:
+def inputs(family: Family, effects: Iterable[PlacedEffect]) -> tuple[Parameter, ...]:
     """List the inputs of effects, and of the later stages' effects that return their load, with stage numbers.
 
     An input that several effects share is listed once, and is required if any of them requires it.

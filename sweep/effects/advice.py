@@ -9,7 +9,7 @@ import numpy as np
 
 from sweep.costs import nanoseconds
 from sweep.effects import applicable, asked_of_machine, asks_speed, called_for, effect, inputs
-from sweep.effects.base import Advice, Effect, Placed
+from sweep.effects.base import Advice, Effect, PlacedEffect
 from sweep.effects.scene import first_scene
 from sweep.families.base import Angles, Array, Family
 from sweep.families.machines.machine import Machine
@@ -26,7 +26,7 @@ class _Part(NamedTuple):
     even: bool = True
 
     @property
-    def offered(self) -> list[Placed]:
+    def offered(self) -> list[PlacedEffect]:
         """Effects of the part, without those that need a speed if another member drives it."""
         of = self.family
         return [p for p in applicable(of) if self.even or not asks_speed(one.name for one in inputs(of, [p]))]
@@ -98,7 +98,7 @@ def tree(family: Family, wanted: Iterable[str], poses: float) -> list[tuple[str,
     return rows
 
 
-def cost(placed: Placed, wanted: frozenset[str], poses: float) -> float:
+def cost(placed: PlacedEffect, wanted: frozenset[str], poses: float) -> float:
     """Time of an effect's wanted outputs [ns per design]."""
     per_design = not wanted.isdisjoint(o.name for o in placed.design_outputs)
     reduced = (name for name in wanted if not any(name == o.name for o in placed.design_outputs))

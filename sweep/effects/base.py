@@ -197,7 +197,7 @@ class Effect:
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedEffect:
     """An effect at the stage of index ``stage``; outputs of the last stage can also be named without its number."""
 
     entry: Effect
@@ -210,7 +210,7 @@ class Placed:
         """Name of the effect with the stage's number."""
         return f"{self.entry.name}{self.number}"
 
-    def narrowed(self, wanted: Iterable[str]) -> Placed:
+    def narrowed(self, wanted: Iterable[str]) -> PlacedEffect:
         """Leave out inputs that no wanted output needs, and the outputs that need them."""
         only_for, names = self.entry.only_for, {self.own[name] for name in wanted if name in self.own}
         left = {name for name, outputs in only_for.items() if names.isdisjoint(outputs)}

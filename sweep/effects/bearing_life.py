@@ -72,7 +72,7 @@ def turn_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
 
 
 @dataclass(frozen=True)
-class Shaft:
+class BearingShaft:
     """A shaft on two rolling bearings.
 
     Parameters
@@ -109,7 +109,7 @@ class Shaft:
         return filled_all(bearing_loads, arguments, names, wanted & frozenset(names), status)
 
 
-def bends(shaft: Shaft, *more: str) -> tuple[Bend, ...]:
+def bends(shaft: BearingShaft, *more: str) -> tuple[Bend, ...]:
     """Kinks of the equivalent loads of a shaft's bearings, and of outputs computed from them.
 
     They occur where the equivalent load changes its formula, and where a support is nearly unloaded.
@@ -118,7 +118,7 @@ def bends(shaft: Shaft, *more: str) -> tuple[Bend, ...]:
     return Bend(names, partial(formula, shaft=shaft)), Bend(names, partial(squares, shaft=shaft), squares=True)
 
 
-def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: Shaft) -> Columns:
+def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: BearingShaft) -> Columns:
     """Compute mean loads and lives, on samples without errors, or with integrals refined to the accuracy.
 
     The travel has a kink where the shaft turns back, and a load jumps where the axial load exceeds e_limit: the
@@ -162,7 +162,7 @@ def _of_turn(worst: Status) -> Status:
     return np.where(worst == st.OK, st.OK, np.maximum(worst, st.NOT_ROTATABLE)).astype(np.uint8)
 
 
-def _loads(scene: Scene, shaft: Shaft) -> tuple[Array, Array, Status]:
+def _loads(scene: Scene, shaft: BearingShaft) -> tuple[Array, Array, Status]:
     """Equivalent loads of both bearings (n, m, 2), rate of travel (n, m), worst status of each design."""
     names = load_names(shaft.name)[3:]
     found = shaft.loads(scene, frozenset(names))
@@ -176,7 +176,7 @@ def _integrands(load: Array, way: Array, size: Array, exponent: Array) -> Array:
     return np.concatenate([power * way[:, :, None], way[:, :, None]], axis=2)
 
 
-def _switches(scene: Scene, shaft: Shaft) -> Array:
+def _switches(scene: Scene, shaft: BearingShaft) -> Array:
     """Functions that change sign where the integrands have kinks or jumps, (k, m, 3).
 
     They are the shaft's turning, the axial load, and its excess over the part e V of the radial load of its bearing.
@@ -204,12 +204,12 @@ def _pierced(scene: Scene) -> list[Array]:
     return found
 
 
-def formula(scene: Scene, shaft: Shaft) -> Array:
+def formula(scene: Scene, shaft: BearingShaft) -> Array:
     """Functions that change sign where an equivalent load has a kink or jumps, (n, m, 2)."""
     return _switches(scene, shaft)[:, :, 1:]
 
 
-def squares(scene: Scene, shaft: Shaft) -> Array:
+def squares(scene: Scene, shaft: BearingShaft) -> Array:
     """Squares of the supports' radial loads, (n, m, 2)."""
     names = load_names(shaft.name)[:2]
     found = shaft.loads(scene, frozenset(names))
@@ -221,7 +221,7 @@ def _discriminant(scene: Scene, rows: Rows, stage: int, name: str, which: Rows, 
     return posed.family.values(posed.designs, posed.angles, name)[0]
 
 
-def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft) -> tuple[Array, Array, Status]:
+def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: BearingShaft) -> tuple[Array, Array, Status]:
     """Integrate the three integrands over the turn of some designs; return integrals, errors and status."""
     status, scene = np.zeros(rows.size, np.uint8), scene.precise()  # plain poses may be noise near a change point
     exponent = shaft.given(scene, "life_exponent")[rows]
@@ -255,7 +255,9 @@ def _refined(scene: Scene, rows: Rows, size: Array, target: float, shaft: Shaft)
 
 
 # Columns of the joint reactions: force and moment of the frame on the rocker.
-ROCKER = Shaft("d", "", (9, 15), lambda scene: scene.records[1][:, None, 3:6], lambda scene: scene.records[0][:, :, 22])
+ROCKER = BearingShaft(
+    "d", "", (9, 15), lambda scene: scene.records[1][:, None, 3:6], lambda scene: scene.records[0][:, :, 22]
+)
 _TEXT, _EQUATION = "the rocker's bearings", "B2 (1)-(3)"
 
 EFFECT = replace(

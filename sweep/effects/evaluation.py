@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kernels.effects.coupler import DRIVING
 from kernels.types import Status
-from sweep.effects.base import Bend, Placed
+from sweep.effects.base import Bend, PlacedEffect
 from sweep.effects.scene import Scene, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
 from sweep.families.capabilities import ThreadPath
@@ -51,7 +51,7 @@ class Added:
 
 
 def effect_poses(
-    added: Added, effects: tuple[Placed, ...], designs: Array, angles: Angles, wanted: frozenset[str]
+    added: Added, effects: tuple[PlacedEffect, ...], designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
     """Compute the family's own poses and each effect with a wanted output; the status is the first that is not OK.
 
@@ -93,7 +93,9 @@ def effect_poses(
     return columns | {"status": status}
 
 
-def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+def run_design(
+    added: Added, placed: PlacedEffect, designs: Array, wanted: frozenset[str], accuracy: Accuracy
+) -> Columns:
     """Compute design outputs of an effect, block by block."""
     whole_turn = placed.entry.design_result
     assert whole_turn is not None
@@ -108,7 +110,7 @@ def run_design(added: Added, placed: Placed, designs: Array, wanted: frozenset[s
     return {"status": whole["status"]} | {name: whole[own] for name, own in pairs if own in whole}
 
 
-def bend_curves(added: Added, placed: Placed, bend: Bend, designs: Array, angles: Angles) -> Array:
+def bend_curves(added: Added, placed: PlacedEffect, bend: Bend, designs: Array, angles: Angles) -> Array:
     """Evaluate the functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
     shape = len(designs), angles.cos.shape[1]
     found: list[Array] = []
@@ -133,7 +135,9 @@ Feeling: TypeAlias = Callable[[str], frozenset[str]]
 """Function that names the pose outputs of effects that depend on an input."""
 
 
-def bent(family: Family, effects: tuple[Placed, ...], curves: Mapping[str, Curve], feeling: Feeling) -> list[Output]:
+def bent(
+    family: Family, effects: tuple[PlacedEffect, ...], curves: Mapping[str, Curve], feeling: Feeling
+) -> list[Output]:
     """Pose outputs of effects, marked with kinks where a table of loads may cause a narrow peak.
 
     Outputs of a thread are also marked where it comes to lie on its take-up and leaves it.
@@ -169,7 +173,7 @@ def piercing(family: Family, added: tuple[Parameter, ...], feeling: Feeling) -> 
     return found
 
 
-def bends(added: Added, effects: tuple[Placed, ...]) -> list[Bends]:
+def bends(added: Added, effects: tuple[PlacedEffect, ...]) -> list[Bends]:
     """Bends of outputs of effects, from the most accurate poses: a cut must hit a narrow peak."""
     precise, found = replace(added, family=added.family.precise()), []
     for placed in effects:
@@ -204,7 +208,7 @@ def _finger_sine(added: Added, stage: int, column: int, designs: Array, angles: 
     return square
 
 
-def features(added: Added, effects: tuple[Placed, ...], feeling: Feeling) -> list[object]:
+def features(added: Added, effects: tuple[PlacedEffect, ...], feeling: Feeling) -> list[object]:
     """Kinks, waves and singularities that effects and loads add to curves."""
     pierced = piercing(added.family, added.inputs, feeling)
     return [*paces(added.curves, feeling), *pierced, *bends(added, effects), *fingers(added, feeling)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels.effects.bearings import journal_pressures
 from sweep.effects.base import DesignResult, Effect
-from sweep.effects.bearing_life import BLOCK, Shaft, load_outputs, turn_outputs
+from sweep.effects.bearing_life import BLOCK, BearingShaft, load_outputs, turn_outputs
 from sweep.effects.bearing_life import FORMULAS as LIFE_FORMULAS
 from sweep.effects.bearing_life import bends as bends_of_shaft
 from sweep.effects.bearing_life import per_turn as turn_of_shaft
@@ -141,9 +141,9 @@ def _turning(scene: Scene, joint: LinkJoint) -> Array:
     return rate
 
 
-def _shaft(tree: LinkTree, joint: LinkJoint) -> Shaft:
+def _shaft(tree: LinkTree, joint: LinkJoint) -> BearingShaft:
     at = 6 * tree.joints.index(joint)
-    return Shaft(
+    return BearingShaft(
         joint.name, f"_{joint.name}", (at, at + 3), partial(axis_of, joint=joint), partial(_turning, joint=joint)
     )
 

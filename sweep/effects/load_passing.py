@@ -30,7 +30,7 @@ Reactions: TypeAlias = Callable[[Scene, Array, frozenset[str], Status], Columns]
 """``(scene, load, wanted, status)``: wanted columns under a load on the output; ``status`` is updated."""
 
 
-class Route(NamedTuple):
+class LoadPath(NamedTuple):
     """Computation of loads for families with a capability.
 
     ``inputs(family)`` lists the inputs of its loads, ``load(scene)`` names the useful load on its output, if any, and
@@ -54,14 +54,14 @@ def _inputs_by_links(family: Family) -> tuple[Parameter, ...]:
 
 
 _ROUTES = {
-    LinkTree: Route(link_loads.frictionless, link_loads.with_friction, _inputs_by_links, link_loads.load_name,
+    LinkTree: LoadPath(link_loads.frictionless, link_loads.with_friction, _inputs_by_links, link_loads.load_name,
                     link_loads.force_name),
-    JointRecords: Route(kinetostatics.frictionless, kinetostatics.with_friction, _inputs_by_records,
+    JointRecords: LoadPath(kinetostatics.frictionless, kinetostatics.with_friction, _inputs_by_records,
                         kinetostatics.load_name, kinetostatics.force_name),
 }  # fmt: skip
 
 
-def route(family: Family) -> Route | None:
+def route(family: Family) -> LoadPath | None:
     """Return how a family's loads are computed; None if it has neither joint records nor a tree of links."""
     return next((found for capability, found in _ROUTES.items() if family.find(capability) is not None), None)
 
@@ -122,7 +122,7 @@ def reactions(scene: Scene) -> tuple[Array, Status]:
     return found
 
 
-def _route_of(scene: Scene) -> Route:
+def _route_of(scene: Scene) -> LoadPath:
     found = route(scene.family)
     if found is None:
         raise TypeError(f"{scene.family.name} has neither joint records nor a tree of links")
@@ -137,7 +137,7 @@ def _carried(scene: Scene, handed_back: Columns) -> dict[str, Array]:
     return dict(zip(INERTIAS, both, strict=True))
 
 
-def _on_output(scene: Scene, found: Route, handed_back: Columns | None, key: str) -> Array:
+def _on_output(scene: Scene, found: LoadPath, handed_back: Columns | None, key: str) -> Array:
     """Load of the output link, less the driving torque of the next stage."""
     name = found.load(scene)
     load = np.zeros((len(scene.designs), 1)) if name is None else scene.load(name)

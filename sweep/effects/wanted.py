@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from sweep.effects import NAMES, applicable
-from sweep.effects.base import Placed
+from sweep.effects.base import PlacedEffect
 from sweep.families.base import Family, Output
 from sweep.families.machines.machine import Machine
 from sweep.families.names import stem
@@ -54,7 +54,7 @@ def names_of_effects(family: Family, poses: bool = False) -> dict[str, tuple[str
     return {name: outputs for name, outputs in found.items() if name not in taken}
 
 
-def _design_names(placed: Placed, reductions: tuple[str, ...]) -> tuple[str, ...]:
+def _design_names(placed: PlacedEffect, reductions: tuple[str, ...]) -> tuple[str, ...]:
     names = {o.name for o in placed.entry.outputs}
     poses = [o for o in placed.entry.outputs if not (o.jumps or o.wraps or _part_of_vector(o, names))]
     whole = placed.entry.design_result

@@ -213,7 +213,7 @@ def _of_stages(family: Family, matrix: Array, angles: Angles, phi: Array, places
 
 def _needed(family: Family) -> set[str]:
     coordinates = {name for at in family.points.values() for name in at if name}
-    return coordinates.union(*(made.needs for made in skeleton_of(family).made.values()))
+    return coordinates.union(*(point.needs for point in skeleton_of(family).moving.values()))
 
 
 def _part(
@@ -225,7 +225,7 @@ def _part(
         name: np.stack([poses[x][0] if x else np.zeros(phi.size) for x in at], axis=-1)
         for name, at in family.points.items()
     }
-    moving |= {name: made.at(matrix, angles, poses)[0] for name, made in skeleton.made.items()}
+    moving |= {name: point.at(matrix, angles, poses)[0] for name, point in skeleton.moving.items()}
     if linked := {joint for link in skeleton.links for joint in link.joints}:
         # A point that no link carries is not a joint: the pitch curve is given in the frame of the cam.
         moving = {name: path for name, path in moving.items() if name in linked}

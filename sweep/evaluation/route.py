@@ -19,7 +19,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import at_stage, by_magnitude, error_of
 from sweep.quantities.box import ROUNDING, Box
-from sweep.quantities.kinds import Group, Reduced
+from sweep.quantities.kinds import GeneralRoute, Reduced
 from sweep.quantities.resolve import find
 from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
@@ -51,7 +51,7 @@ class Route:
     outputs: tuple[str, ...]
     ns_per_design: float
     run: Callable[[Array, Accuracy, Window], Columns]
-    general: Group | Literal[""] = ""
+    general: GeneralRoute | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
     columns: int | None = None
 
@@ -79,7 +79,7 @@ def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accu
 
 
 def general_route(
-    family: Family, general: Group, effect: str, outputs: tuple[str, ...], accuracy: Accuracy, windowed: bool
+    family: Family, general: GeneralRoute, effect: str, outputs: tuple[str, ...], accuracy: Accuracy, windowed: bool
 ) -> Route:
     """Make the route of a general reduction over poses."""
     run = partial(_run_general, family, general, outputs)
@@ -89,7 +89,7 @@ def general_route(
 
 
 def _run_general(
-    family: Family, general: Group, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Window
+    family: Family, general: GeneralRoute, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Window
 ) -> Columns:
     match general:
         case "margin":

@@ -25,7 +25,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member
-from sweep.quantities.kinds import Extent, Group, LargestLength, Margin, Negative, Quantity, TimingOf, group_of
+from sweep.quantities.kinds import Extent, GeneralRoute, LargestLength, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
@@ -161,7 +161,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
     # The margin of a whole chain needs all stages: the first stage alone would reject designs before the others.
     chain_margin = any(own_steps[n] is None and isinstance(q, Margin) and not q.stage for n, q in quantities.items())
     steps: dict[tuple[str, int], tuple[Step, Stage, list[str]]] = {}
-    groups: dict[tuple[Group, str], list[str]] = {}
+    groups: dict[tuple[GeneralRoute, str], list[str]] = {}
     for name, quantity in quantities.items():
         step, group = own_steps[name], group_of(family, quantity)
         if isinstance(quantity, Negative | Extent | TimingOf):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sweep.errors import InputError, extra
-from sweep.exchange.scene import Placed, extent, frames_of, shown_name
+from sweep.exchange.scene import PlacedPart, extent, frames_of, shown_name
 from sweep.families.base import Array
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def ezdxf_or_refuse() -> Any:
     return ezdxf
 
 
-def write_dxf(placed: list[Placed], path: Path, unit: str) -> None:
+def write_dxf(placed: list[PlacedPart], path: Path, unit: str) -> None:
     """Write the first pose with the joints' paths.
 
     Planar parts are drawn from the front, spatial ones from the side and top as well.

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.joints import Part
-from sweep.exchange.scene import Placed, extent, shown_name
+from sweep.exchange.scene import PlacedPart, extent, shown_name
 from sweep.families.base import Array
 from sweep.families.capabilities import Link
 
@@ -97,7 +97,7 @@ class GltfModel:
         return {"attributes": attributes, "indices": self.accessor(faces.reshape(-1), "SCALAR", ELEMENT_BUFFER)}
 
 
-def write_glb(name: str, placed: list[Placed], path: Path, metres: float, seconds: float) -> None:
+def write_glb(name: str, placed: list[PlacedPart], path: Path, metres: float, seconds: float) -> None:
     """Write an animation of one turn in ``seconds``; ``metres`` is the length unit of the joints."""
     model = GltfModel()
     poses = placed[0].part.phi.size
@@ -132,7 +132,7 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
     return {"name": name, "pbrMetallicRoughness": surface}
 
 
-def _group(model: GltfModel, placed: Placed, times: int, size: float) -> int:
+def _group(model: GltfModel, placed: PlacedPart, times: int, size: float) -> int:
     """Return the node of a part with those of its links, joints and axes."""
     part, children, thick = placed.part, [], 0.008 * size
     for k, link in enumerate(part.links):

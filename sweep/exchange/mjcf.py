@@ -19,7 +19,7 @@ from sweep.effects.scene import Scene
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
 from sweep.evaluation.poses import evaluate
-from sweep.exchange.scene import Placed, extent
+from sweep.exchange.scene import PlacedPart, extent
 from sweep.families import names
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
@@ -57,7 +57,7 @@ class Loop:
     turn: Array
 
 
-def write_mjcf(family: Family, placed: list[Placed], design: Mapping[str, float], path: Path, unit: str) -> None:
+def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, float], path: Path, unit: str) -> None:
     """Write the model in its first pose.
 
     Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design,
@@ -122,7 +122,7 @@ def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None
     )  # fmt: skip
 
 
-def _loop(placed: Placed, finger: float, metres: float) -> Loop:
+def _loop(placed: PlacedPart, finger: float, metres: float) -> Loop:
     """Return the stage's joints and directions, from its joint records."""
     part = placed.part
     records = part.family.find(JointRecords)

@@ -26,14 +26,14 @@ GAP = 0.25  # gap between two frames side by side, relative to the larger one
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedPart:
     """A part, and the displacement of its frame beside other frames."""
 
     part: Part
     shift: Array
 
 
-def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Placed]:
+def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[PlacedPart]:
     """Return all parts over one turn as in :func:`over`, each with its place in the scene.
 
     Raises
@@ -123,7 +123,7 @@ def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
     return [_taken(part, [k], steps[[k]]) for part in parts(mechanism, design, steps)]
 
 
-def side_by_side(stages: Sequence[Part]) -> list[Placed]:
+def side_by_side(stages: Sequence[Part]) -> list[PlacedPart]:
     """Place the parts of one frame together, and each further frame beside those before it, along x; same order."""
     shifts, right = {}, math.nan
     for frame, same in frames_of(stages).items():
@@ -132,7 +132,7 @@ def side_by_side(stages: Sequence[Part]) -> list[Placed]:
         along = 0.0 if math.isnan(right) else right + GAP * extent(same) - low
         shifts[frame] = np.array([along, 0.0, 0.0])
         right = high + along
-    return [Placed(part, shifts[part.frame]) for part in stages]
+    return [PlacedPart(part, shifts[part.frame]) for part in stages]
 
 
 def extent(stages: Sequence[Part]) -> float:

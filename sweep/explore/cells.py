@@ -22,7 +22,7 @@ MOST_BINS, NOWHERE = 64, 255
 Places: TypeAlias = NDArray[np.uint8]
 
 
-class Column(NamedTuple):
+class RankedColumn(NamedTuple):
     """A column of the feasible designs, the best first, with its ends."""
 
     values: Array
@@ -99,12 +99,12 @@ def _places(folder: Path, merit: str, name: str, bins: int) -> Places:
 
 
 @lru_cache(64)
-def _column(folder: Path, merit: str, name: str) -> Column:
+def _column(folder: Path, merit: str, name: str) -> RankedColumn:
     """Read a column of the feasible designs, the best first."""
     values = _read(folder, name)[_order(folder, merit)]
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    return Column(values, low, high if high > low else low + (abs(low) or 1.0))
+    return RankedColumn(values, low, high if high > low else low + (abs(low) or 1.0))
 
 
 @lru_cache(2)

@@ -38,7 +38,7 @@ PINS = 3
 
 
 @dataclass(frozen=True)
-class Range:
+class PageDimension:
     """A dimension of the page; ``factor`` converts the stored value to ``unit``; ``swept`` if the study sweeps it.
 
     ``positive`` says that it may not be negative.
@@ -81,12 +81,12 @@ class Hand:
         return [name for name in self.study.bare.parameter_names if name not in given]
 
     @cached_property
-    def ranges(self) -> list[Range]:
+    def ranges(self) -> list[PageDimension]:
         """Dimensions of the mechanism, and inputs of effects that the study gives."""
         given = {*self.own, *self.study.written} - {*self.study.curves}
         return [self._range(p) for p in self.family.parameters if p.name in given]
 
-    def _range(self, p: Parameter) -> Range:
+    def _range(self, p: Parameter) -> PageDimension:
         shown = quantity(p.name, self.data.units.get(p.name, PARAMETER_UNITS[p.unit]))
         value, swept = self.first[p.name], p.name in self.study.space.bounds
         reach = REACH * (abs(value) or 1.0) if p.unit != "angle" else math.pi
@@ -95,7 +95,7 @@ class Hand:
         low, high = self.study.space.bounds.get(p.name, ends)
         low, high = (min(low, value), max(high, value)) if low < high else ends
         low = value * (1.0 - REACH) if p.positive and low <= 0.0 else low
-        return Range(
+        return PageDimension(
             p.name, p.text, shown.unit, shown.factor, low, high, tuple(p.choices or ()),
             swept and low < high, positive,
         )  # fmt: skip

@@ -14,7 +14,7 @@ import numpy as np
 from kernels.families import backrest
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter, floats
-from sweep.families.capabilities import Fixed, Link, Made, Skeleton
+from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton
 from sweep.families.poses import chosen, guarded
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
@@ -180,7 +180,7 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
         psi = parameter(parameters, "psi", designs)
         return np.stack([-np.cos(psi), np.sin(psi), 0.0 * psi], axis=1)
 
-    def made(needs: tuple[str, ...], at: Callable[..., tuple[Array, Array]]) -> Made:
+    def made(needs: tuple[str, ...], at: Callable[..., tuple[Array, Array]]) -> MovingPoint:
         """Make a point of the plane: ``at(column, designs, rho, *needs)`` returns its x and y, each (n, m)."""
 
         def place(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -188,7 +188,7 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
             x, y = at(lambda name: column(name, designs), angles.phi, *values)
             return np.stack([x, y, 0.0 * x], axis=-1)
 
-        return Made(needs, place)
+        return MovingPoint(needs, place)
 
     axis = ("x_axis", "y_axis")
     return Skeleton(

@@ -10,7 +10,7 @@ import numpy as np
 from kernels.families import cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Dimensions, Link, Made, OutputLink, Skeleton
+from sweep.families.capabilities import Dimensions, Link, MovingPoint, OutputLink, Skeleton
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
@@ -157,7 +157,7 @@ LEVER = Family(
         Skeleton(
             {"a": ORIGIN, "d": standing(LEVER_PARAMETERS, "e")},
             (Link("cam", ("a",)), Link("lever", ("d", "r"))),
-            {"r": Made(("psi",), roller)},
+            {"r": MovingPoint(("psi",), roller)},
         ),
     ),
 )

@@ -255,7 +255,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Made:
+class MovingPoint:
     """A moving point that is no pose output: ``at(designs, angles, motion)``, (n, m, 3), from the outputs ``needs``."""
 
     needs: tuple[str, ...]
@@ -266,12 +266,12 @@ class Made:
 class Skeleton:
     """Fixed points of the family's frame, further moving points, and the joints that each link connects.
 
-    Moving joints are the family's points and those of ``made``.  Drawings and exports are generated from it.
+    Moving joints are the family's points and those of ``moving``.  Drawings and exports are generated from it.
     """
 
     fixed: Mapping[str, Fixed]
     links: tuple[Link, ...]
-    made: Mapping[str, Made] = field(default_factory=dict)
+    moving: Mapping[str, MovingPoint] = field(default_factory=dict)
 
 
 def skeleton_of(family: Family) -> Skeleton:

@@ -80,17 +80,17 @@ def _drawing(family: Family) -> list[str]:
             "no Skeleton among the capabilities: give fixed points with their axes, and links by their joints; "
             "drawings, reports and exports are made from it"
         ]
-    known = {*family.points, *skeleton.fixed, *skeleton.made}
+    known = {*family.points, *skeleton.fixed, *skeleton.moving}
     faults += [
-        f"link {link.name}: {joint!r} is no point: name it in points, or in fixed or made of the Skeleton"
+        f"link {link.name}: {joint!r} is no point: name it in points, or in fixed or moving of the Skeleton"
         for link in skeleton.links
         for joint in link.joints
         if joint not in known
     ]
     faults += [
         f"point {name} needs {one!r}, which is no pose output"
-        for name, made in skeleton.made.items()
-        for one in made.needs
+        for name, point in skeleton.moving.items()
+        for one in point.needs
         if one not in names
     ]
     if not skeleton.links:

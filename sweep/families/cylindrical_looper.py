@@ -11,7 +11,7 @@ from kernels.families.cylindrical_looper.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Dimensions, Link, Made, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import poses_of
@@ -91,14 +91,14 @@ def _of_both(designs: Array, angles: Angles, wanted: frozenset[str], beside: np.
     return found
 
 
-def foot(height: str) -> Made:
+def foot(height: str) -> MovingPoint:
     """Make the point of the shaft at the height of a pose output: of the rocker's ball, or of the working point."""
 
     def at(designs: Array, angles: Angles, motion: Columns) -> Array:
         z = np.asarray(motion[height], np.float64)
         return np.stack([parameter(PARAMETERS, "e1", designs)[:, None] + 0.0 * z, 0.0 * z, z], axis=-1)
 
-    return Made((height,), at)
+    return MovingPoint((height,), at)
 
 
 _ON_AXIS = "from the axis at the height of the rocker's ball"

@@ -19,7 +19,7 @@ from kernels.families.feed.motion import OUTPUTS as _POSES
 from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
 from kernels.types import EPS, Array
 from sweep.families.base import PER_RADIAN, Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
-from sweep.families.capabilities import Arm, Dimensions, Link, Made, Skeleton
+from sweep.families.capabilities import Arm, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
 from sweep.families.outputs import joint_outputs, ladders
@@ -136,13 +136,13 @@ def rocker_loop(parameters: tuple[Parameter, ...], designs: Array, angles: Angle
     return _of_chain(parameters, designs, angles, "discriminant")[0]
 
 
-def chain_joints(parameters: tuple[Parameter, ...]) -> dict[str, Made]:
+def chain_joints(parameters: tuple[Parameter, ...]) -> dict[str, MovingPoint]:
     """Points of the skeleton: crank pin and rocker ball of the horizontal chain."""
 
     def joint(name: str, designs: Array, angles: Angles, found: Columns) -> Array:
         return np.stack(_of_chain(parameters, designs, angles, *(f"{axis}_{name}" for axis in AXES)), axis=-1)
 
-    return {name: Made((), partial(joint, name)) for name in "bc"}
+    return {name: MovingPoint((), partial(joint, name)) for name in "bc"}
 
 
 CHAIN_LINKS = (CRANK, COUPLER, Link("rocker", ("d", "c", "h")))
@@ -252,7 +252,7 @@ def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
     return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
 
 
-def eccentric(number: int) -> Made:
+def eccentric(number: int) -> MovingPoint:
     """Point of the skeleton: centre of an eccentric."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -261,10 +261,10 @@ def eccentric(number: int) -> Made:
         turn = angles.phi + ahead
         return np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn), 0.0 * turn], axis=-1)
 
-    return Made((), at)
+    return MovingPoint((), at)
 
 
-def rack_joint(number: int) -> Made:
+def rack_joint(number: int) -> MovingPoint:
     """Point of the skeleton: joint of a link on the rack."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -273,7 +273,7 @@ def rack_joint(number: int) -> Made:
         cos, sin = np.cos(chi), np.sin(chi)
         return np.stack([x + along * cos - across * sin, y + along * sin + across * cos, 0.0 * chi], axis=-1)
 
-    return Made(("x_t", "y_t", "chi"), at)
+    return MovingPoint(("x_t", "y_t", "chi"), at)
 
 
 _SURELY = 1e-6  # relative excess of a side over the sum of the others, above rounding of a rocker pin
@@ -338,7 +338,7 @@ TRIAD = Family(
                 Link("rack", ("f1", "f2", "f3", "t")),
             ),
             chain_joints(TRIAD_PARAMETERS) | {
-                "h": Made((), rocker_pin), "e2": eccentric(2), "e3": eccentric(3),
+                "h": MovingPoint((), rocker_pin), "e2": eccentric(2), "e3": eccentric(3),
                 "f1": rack_joint(1), "f2": rack_joint(2), "f3": rack_joint(3),
             },
         ),

@@ -17,7 +17,7 @@ from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
 from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work, floats
-from sweep.families.capabilities import Fixed, Link, Made, PresserFoot, Skeleton
+from sweep.families.capabilities import Fixed, Link, MovingPoint, PresserFoot, Skeleton
 from sweep.families.poses import chosen, guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import parameter, standing
@@ -205,7 +205,7 @@ FAMILY = Family(
         Skeleton(
             {"d": standing(PARAMETERS, axis=UPWARDS, kind="slide")},
             (Link("foot", ("p",)), Link("rack", ("t",))),
-            {"p": Made(("y_foot",), foot_place), "t": Made(("y_rack",), rack_place)},
+            {"p": MovingPoint(("y_foot",), foot_place), "t": MovingPoint(("y_rack",), rack_place)},
         ),
     ),
 )
@@ -272,14 +272,14 @@ def _rack(designs: Array, angles: Angles, *names: str) -> list[Array]:
     return feed.FAMILY.values(np.ascontiguousarray(designs[:, :_RACK_COLUMNS]), angles, *names)
 
 
-def of_rack(joint: str) -> Made:
+def of_rack(joint: str) -> MovingPoint:
     """Point of the skeleton: joint of the feed mechanism."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
         x, y = _rack(designs, angles, f"x_{joint}", f"y_{joint}")
         return np.stack([x, y, 0.0 * x], axis=-1)
 
-    return Made((), at)
+    return MovingPoint((), at)
 
 
 def plate(designs: Array) -> Array:
@@ -326,7 +326,7 @@ ON_FEED = Family(
             (*feed.SKELETON.links, Link("foot", ("p",))),
             feed.chain_joints(FEED_PARAMETERS)
             | {joint: of_rack(joint) for joint in ("h", "e", "f", "t")}
-            | {"p": Made(("y_foot",), feed_foot_place)},
+            | {"p": MovingPoint(("y_foot",), feed_foot_place)},
         ),
     ),
 )

@@ -47,7 +47,7 @@ class Frame(NamedTuple):
         return Frame(back, -_times(back, self.at))
 
 
-class Axis(NamedTuple):
+class TurningAxis(NamedTuple):
     """A turning axis: a point of it, its direction, and the zero direction of angles about it; each (n, 3)."""
 
     at: Array
@@ -92,7 +92,7 @@ def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray(np.einsum("nij,nj->ni", matrix, vector))
 
 
-def mounted(axis: Axis, crank: Axis, sense: Any, shift: Any, turn: Any) -> Frame:
+def mounted(axis: TurningAxis, crank: TurningAxis, sense: Any, shift: Any, turn: Any) -> Frame:
     """Compute the frame whose crank axis lies on a turning axis, machine-and-stitch (1) and (4).
 
     Parameters
@@ -114,7 +114,7 @@ def _triad(zero: Array, along: Array, axis: int) -> Array:
     return np.stack([zero, product(along, zero), along], axis=axis)
 
 
-def crank_axis(family: Family, designs: Array) -> Axis | None:
+def crank_axis(family: Family, designs: Array) -> TurningAxis | None:
     """Return the axis of the first crank in the family's frame; None if the family has none."""
     fixed = skeleton_of(family).fixed
     crank = next((fixed[name] for name in CRANKS if name in fixed), None)
@@ -122,16 +122,16 @@ def crank_axis(family: Family, designs: Array) -> Axis | None:
         return None
     at = crank.at if crank.foot is None else crank.foot
     zero = np.tile(X, (len(designs), 1)) if crank.zero is None else crank.zero(designs)
-    return Axis(at(designs), crank.axis(designs), zero)
+    return TurningAxis(at(designs), crank.axis(designs), zero)
 
 
-def output_axis(family: Family, designs: Array) -> Axis | None:
+def output_axis(family: Family, designs: Array) -> TurningAxis | None:
     """Return the output link's axis in the family's frame, from its point with z = 0; None without such a link."""
     link = family.find(OutputLink)
     if link is None:
         return None
     at = link.origin(designs)
-    return Axis(at, np.tile(Z, (len(at), 1)), np.tile(X, (len(at), 1)))
+    return TurningAxis(at, np.tile(Z, (len(at), 1)), np.tile(X, (len(at), 1)))
 
 
 def stage_frames(stages: Sequence[Stage], designs: Array) -> list[Frame]:

@@ -10,7 +10,7 @@ import numpy as np
 from kernels.families import free_cam
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, March, Output, Parameter, floats
-from sweep.families.capabilities import Link, Made, Skeleton, ThreadPath
+from sweep.families.capabilities import Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Bends
 from sweep.families.outputs import ladders
 from sweep.families.planar_trees import turning_cam
@@ -50,7 +50,7 @@ poses = poses_of(free_cam.poses, free_cam.Outputs)
 EDGE = {"k1": -1.0, "k2": -0.5, "k3": 0.5, "k4": 1.0}
 
 
-def edge_point(share: float) -> Made:
+def edge_point(share: float) -> MovingPoint:
     """Make a point of the edge, at a share of the larger distance of a guide from the cam axis."""
 
     def at(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -58,7 +58,7 @@ def edge_point(share: float) -> Made:
         y = share * np.maximum(np.hypot(x1, y1), np.hypot(x2, y2))
         return turned(a * y * y, y, angles)
 
-    return Made((), at)
+    return MovingPoint((), at)
 
 
 def turned(x: Array, y: Array, angles: Angles) -> Array:
@@ -167,7 +167,7 @@ WITH_FRICTION = Family(
         Skeleton(
             SKELETON_FIXED,
             LINKS,
-            EDGE_POINTS | {"contact": Made(("y_contact", "contact"), contact_place)},
+            EDGE_POINTS | {"contact": MovingPoint(("y_contact", "contact"), contact_place)},
         ),
     ),
     example={**FAMILY.example, "mu": 0.3, "tension_ratio": 1.5},

@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.families import epicyclic_dwell, geared_dwell
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Link, Made, OutputLink, Skeleton, constant
+from sweep.families.capabilities import Link, MovingPoint, OutputLink, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import rolling_planet
@@ -143,7 +143,7 @@ def skeleton(parameters: tuple[Parameter, ...]) -> Skeleton:
     return Skeleton(
         {"a": standing(parameters, "a"), "d": ORIGIN},
         (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
-        {"o": Made((), centre)},
+        {"o": MovingPoint((), centre)},
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import guided_cam
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Fixed, Link, Made, Skeleton, ThreadPath
+from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
 from sweep.families.poses import poses_of
@@ -138,7 +138,7 @@ FAMILY = Family(
                 Link("thread 1", ("n1", "r")),
                 Link("thread 2", ("r", "n2")),
             ),
-            {"r": Made(("S",), follower)},
+            {"r": MovingPoint(("S",), follower)},
         ),
     ),
 )

@@ -7,7 +7,7 @@ import numpy as np
 from kernels.families import heddle
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, Made, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, MovingPoint, Skeleton
 from sweep.families.outputs import joint_outputs, ladders
 from sweep.families.planar_trees import heddle_shaft
 from sweep.families.poses import poses_of
@@ -132,8 +132,8 @@ FAMILY = Family(
                 Link("shaft", ("g",)),
             ),
             {
-                "d": Made(("chi",), lower_arm), "e": Made(("lam",), shaft_lever), "f": Made(("lam",), shaft_lever_back),
-                "g": Made(("y",), shaft),
+                "d": MovingPoint(("chi",), lower_arm), "e": MovingPoint(("lam",), shaft_lever),
+                "f": MovingPoint(("lam",), shaft_lever_back), "g": MovingPoint(("y",), shaft),
             },
         ),
     ),

@@ -11,7 +11,7 @@ import numpy as np
 from kernels.types import Array
 from sweep.errors import InputError, choices, number, sign
 from sweep.families.base import Parameter
-from sweep.families.frames import Axis, Frame, mounted, place_parameters, tilted
+from sweep.families.frames import Frame, TurningAxis, mounted, place_parameters, tilted
 
 SHAFT_KEYS = ("at", "axis", "zero", "ratio", "phase")
 MOUNT_KEYS = ("shaft", "sense", "shift", "turn", "key")
@@ -47,11 +47,11 @@ class Shaft:
         phase = () if self.name == MAIN else (Parameter("phase", "angle", text, default=self.phase),)
         return tuple(replace(p, name=f"{self.name}_{p.name}") for p in (*own, *phase))
 
-    def axis(self, given: Array) -> Axis:
+    def axis(self, given: Array) -> TurningAxis:
         """Return the axis of designs, from the columns of its parameters."""
         zero, along = np.array(self.zero), np.array(self.along)
         rotation = tilted(np.stack([zero, np.cross(along, zero), along], axis=1)[None], given[:, 3:6])
-        return Axis(given[:, :3], rotation[:, :, 2], rotation[:, :, 0])
+        return TurningAxis(given[:, :3], rotation[:, :, 2], rotation[:, :, 0])
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Mount:
         phase = 0.0 if self.shaft.name == MAIN else designs[:, self.columns.stop - 1]
         return self.sense * (phase + key - turn)
 
-    def frame(self, designs: Array, crank: Axis, shift: Array, turn: Array) -> Frame:
+    def frame(self, designs: Array, crank: TurningAxis, shift: Array, turn: Array) -> Frame:
         """Return the frame of the member's first stage in the machine's frame."""
         return mounted(self.shaft.axis(designs[:, self.columns]), crank, float(self.sense), shift, turn)
 

@@ -17,7 +17,7 @@ from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, floats
-from sweep.families.capabilities import Assembly, Dimensions, Link, Made, OutputLink, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, MovingPoint, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
@@ -189,7 +189,7 @@ PLANAR = Family(
         Skeleton(
             {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
             (CRANK, Link("rocker", ("d", "c", "b"))),
-            {"c": Made(("psi",), slot_foot)},
+            {"c": MovingPoint(("psi",), slot_foot)},
         ),
     ),
 )

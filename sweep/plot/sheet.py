@@ -39,7 +39,7 @@ ZERO = 1e-9  # mm: smaller coordinates are rounding of zero
 ENDINGS = (".pdf", ".svg", ".dxf")
 
 
-class Table(NamedTuple):
+class SheetTable(NamedTuple):
     """A table of the sheet: title, column headings and lines."""
 
     title: str
@@ -80,7 +80,7 @@ def write_sheet(folder: str | Path, design: str | int | None, path: str | Path, 
     return target
 
 
-def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
+def tables_of(data: Dataset, parts: Sequence[Part]) -> list[SheetTable]:
     """Return dimensions with tolerances, hardpoints of one position, limits, cyclogram, and inputs of effects."""
     study, tolerance = data.study, data.study.tolerance
     names = study.family.parameter_names
@@ -109,16 +109,16 @@ def tables_of(data: Dataset, parts: Sequence[Part]) -> list[Table]:
     )
     limits = tuple((x.shown.symbol, x.bound, x.value, x.state) for x in limit_states(data))
     tables = [
-        Table("Dimensions", heads, tuple(lines)),
-        Table("Hardpoints [mm]", ("joint", "x", "y", "z"), joints),
-        Table("Limits", ("limit", "required", "design", ""), limits),
+        SheetTable("Dimensions", heads, tuple(lines)),
+        SheetTable("Hardpoints [mm]", ("joint", "x", "y", "z"), joints),
+        SheetTable("Limits", ("limit", "required", "design", ""), limits),
         *_cyclogram(data),
-        *([Table("Bodies, loads and scene", heads, tuple(others))] if others else []),
+        *([SheetTable("Bodies, loads and scene", heads, tuple(others))] if others else []),
     ]
     return [t._replace(lines=tuple(tuple(x.replace("\u00a0", " ") for x in line) for line in t.lines)) for t in tables]
 
 
-def _cyclogram(data: Dataset) -> list[Table]:
+def _cyclogram(data: Dataset) -> list[SheetTable]:
     turn = cyclogram_of(data)
     if turn is None:
         return []
@@ -127,10 +127,10 @@ def _cyclogram(data: Dataset) -> list[Table]:
         (f"{member} {name}".strip(), kind, f"{number(start, 4)}°", "" if kind == "event" else f"{number(end, 4)}°")
         for member, kind, name, start, end, _ in events
     ]
-    return [Table("Cyclogram, by the angle of the main shaft", ("what", "", "from", "to"), tuple(lines))]
+    return [SheetTable("Cyclogram, by the angle of the main shaft", ("what", "", "from", "to"), tuple(lines))]
 
 
-def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target: Path) -> None:
+def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[SheetTable], target: Path) -> None:
     frames = frames_of(parts)
     panels = [(frame, view) for frame, same in frames.items() for view in (WORDS if is_spatial(same) else ("xy",))]
     rows = _rows(tables)
@@ -154,7 +154,7 @@ def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[Table], target:
         figure.savefig(target, format=form, metadata={"CreationDate" if form == "pdf" else "Date": None})
 
 
-def _rows(tables: Sequence[Table]) -> list[list[Table]]:
+def _rows(tables: Sequence[SheetTable]) -> list[list[SheetTable]]:
     """Lay out tables in rows: the beginnings of the first ones in the first row, then all the rest."""
     blocks = [
         table._replace(title=table.title + ", continued" * (k > 0), lines=table.lines[k : k + LINES])
@@ -166,7 +166,7 @@ def _rows(tables: Sequence[Table]) -> list[list[Table]]:
     return [first, *(rest[k : k + wide] for k in range(0, len(rest), wide))]
 
 
-def _set(axes: Axes, table: Table | None) -> None:
+def _set(axes: Axes, table: SheetTable | None) -> None:
     """Draw a table with the line height of all tables."""
     from matplotlib.transforms import Bbox
 
@@ -190,7 +190,7 @@ def _set(axes: Axes, table: Table | None) -> None:
         cell.set_linewidth(0.3)
 
 
-def _fitted(table: Table, wide: float) -> tuple[list[list[str]], list[float]]:
+def _fitted(table: SheetTable, wide: float) -> tuple[list[list[str]], list[float]]:
     """Return lines of a table and shares of its columns, by their longest words; the last column is cut to fit."""
     rows = [table.heads, *table.lines]
     longest = [max(len(row[k]) for row in rows) + 2 * PAD for k in range(len(table.heads))]

@@ -137,11 +137,11 @@ Quantity: TypeAlias = (
     | TimingOf | OwnOutput | Negative
 )  # fmt: skip
 
-Group: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
+GeneralRoute: TypeAlias = Literal["margin", "limits", "reductions", "means", "events"]
 """Groups of quantities that one general route computes together."""
 
 
-def group_of(family: Family, asked: Quantity) -> Group | None:
+def group_of(family: Family, asked: Quantity) -> GeneralRoute | None:
     """Name the general route that computes a quantity from poses; None where there is none."""
     match asked:
         case Margin():

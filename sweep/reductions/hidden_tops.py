@@ -17,7 +17,7 @@ from kernels.types import TWO_PI
 from sweep.families.base import Array
 from sweep.numerics.records import joined, only
 from sweep.quantities.kinds import Request
-from sweep.reductions.refine import Candidates, Peaks, Sampler
+from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
 from sweep.reductions.sampling import Index, Mask
 
 # Error of the first guess relative to the fall to the next samples above which a maximum is looked at closely: it was
@@ -35,7 +35,7 @@ class Sampled(NamedTuple):
     columns: dict[str, Array]
     samples: int
 
-    def around(self, requests: Sequence[Request], candidates: Candidates, near: Index) -> Array:
+    def around(self, requests: Sequence[Request], candidates: PeakCandidates, near: Index) -> Array:
         """Return the samples around candidates, (k, q), at offsets ``near`` (q,) from each candidate's own sample."""
         number, row, column, _ = candidates
         found = np.empty((row.size, near.size))
@@ -45,7 +45,7 @@ class Sampled(NamedTuple):
         return found
 
 
-def doubtful(candidates: Candidates, peaks: Peaks, around: Array, tolerance: Array) -> Index:
+def doubtful(candidates: PeakCandidates, peaks: Peaks, around: Array, tolerance: Array) -> Index:
     """Select the refined peaks beside which samples may hide a higher one.
 
     Parameters
@@ -64,7 +64,7 @@ def doubtful(candidates: Candidates, peaks: Peaks, around: Array, tolerance: Arr
     return found
 
 
-def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Mask) -> Candidates:
+def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Mask) -> PeakCandidates:
     """List the curves that may fall to zero beside a switch: magnitudes whose smallest value is wanted.
 
     Parameters
@@ -76,10 +76,12 @@ def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Ma
     for k, request in enumerate(requests):
         wanted[k] &= request.mode == -1 and columns[request.pose].min(axis=1) >= 0.0
     number, row = np.nonzero(wanted)
-    return Candidates(number, row, np.zeros(row.size, np.int64), np.full(row.size, -1.0))
+    return PeakCandidates(number, row, np.zeros(row.size, np.int64), np.full(row.size, -1.0))
 
 
-def closer_looks(tops: Candidates, beside: Candidates, angles: Array, samples: int) -> tuple[Candidates, Array]:
+def closer_looks(
+    tops: PeakCandidates, beside: PeakCandidates, angles: Array, samples: int
+) -> tuple[PeakCandidates, Array]:
     """List candidates for a closer look, at maxima and at switches, with their rising angles (q, m).
 
     Parameters
@@ -95,7 +97,9 @@ def closer_looks(tops: Candidates, beside: Candidates, angles: Array, samples: i
     return joined(tops, every), spacing * phi
 
 
-def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess: Array) -> tuple[Candidates, Peaks]:
+def tops_of(
+    sample: Sampler, looks: PeakCandidates, phi: Array, samples: int, guess: Array
+) -> tuple[PeakCandidates, Peaks]:
     """Find the places of closer looks that are higher than both neighbours, as peaks to be refined.
 
     ``guess`` are the heights by the even samples of the first looks.
@@ -109,7 +113,7 @@ def tops_of(sample: Sampler, looks: Candidates, phi: Array, samples: int, guess:
     return found, Peaks(at, height, gap, np.full(look.size, np.inf), shown, gap, 0.5 * gap)
 
 
-def apart(known: tuple[Candidates, Peaks], found: tuple[Candidates, Peaks]) -> Index:
+def apart(known: tuple[PeakCandidates, Peaks], found: tuple[PeakCandidates, Peaks]) -> Index:
     """Select the found peaks that differ from all known ones of the same curve: they are farther away than the gap.
 
     One maximum listed twice, with different errors, would make a tie whose place is chosen by rounding.
@@ -122,7 +126,7 @@ def apart(known: tuple[Candidates, Peaks], found: tuple[Candidates, Peaks]) -> I
     return new
 
 
-def _curve(candidates: Candidates, requests: int) -> Index:
+def _curve(candidates: PeakCandidates, requests: int) -> Index:
     """Index of each candidate's curve."""
     numbers: Index = candidates.row * requests + candidates.request
     return numbers

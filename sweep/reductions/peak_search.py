@@ -17,7 +17,7 @@ from sweep.numerics.ties import first_of_equals
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
-from sweep.reductions.refine import Candidates, Peaks, Sampler
+from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
 from sweep.reductions.rounding import (
     measure_constants,
@@ -145,7 +145,7 @@ class Search:
 
     def _candidates(
         self, rows: Index, columns: dict[str, Array], samples: int
-    ) -> tuple[Candidates, Array, Index, Mask]:
+    ) -> tuple[PeakCandidates, Array, Index, Mask]:
         """Return candidates, sizes of the curves, samples needed, and which curves are constants, noise or jump."""
         needed, pieces = np.full((len(self.requests), rows.size), START), []
         scales, alone = np.empty(needed.shape), np.zeros(needed.shape, np.bool_)
@@ -171,10 +171,10 @@ class Search:
                 torn = jumps(values, scale, ROUGH)
                 self.torn[number, rows[torn]], alone[number, torn], rough[torn] = True, True, 0.0
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
-            pieces.append(Candidates(np.full(count, number), row, column, sign))
+            pieces.append(PeakCandidates(np.full(count, number), row, column, sign))
             needed[number, rough > ROUGH] = 2 * samples
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
-        return Candidates(*joined), scales, needed, alone
+        return PeakCandidates(*joined), scales, needed, alone
 
     def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Index:
         distance = np.full(count, np.inf)
@@ -187,7 +187,9 @@ class Search:
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
         return samples_needed
 
-    def _refine(self, turn: Sampled, candidates: Candidates, size: Array, resolved: Mask) -> tuple[Candidates, Peaks]:
+    def _refine(
+        self, turn: Sampled, candidates: PeakCandidates, size: Array, resolved: Mask
+    ) -> tuple[PeakCandidates, Peaks]:
         """Refine the candidates, and add the peaks that closer looks find beside them and beside switches."""
         spacing = np.full(candidates.row.size, TWO_PI / turn.samples)
         around = candidates.sign[:, None] * turn.around(self.requests, candidates, np.arange(-3, 4))
@@ -198,7 +200,7 @@ class Search:
         hidden = doubtful(candidates, peaks, around, enough * size[candidates[:2]])
         least = [request.pose for request in self.requests if request.mode == -1 and not self.anywhere]
         angles = switches(self.family, self.designs[turn.rows], least)
-        beside = dips(self.requests, turn.columns, resolved) if angles.shape[1] else Candidates.none()
+        beside = dips(self.requests, turn.columns, resolved) if angles.shape[1] else PeakCandidates.none()
         looks, phi = closer_looks(only(candidates, hidden), beside, angles, turn.samples)
         if len(phi):
             sample = self._sampler(self.family, turn, looks)
@@ -224,13 +226,13 @@ class Search:
         self._confirm(turn, candidates, peaks, size[candidates[:2]], share)
         return candidates, peaks
 
-    def _sharpened(self, turn: Sampled, candidates: Candidates, first: Peaks, size: Array) -> Peaks:
+    def _sharpened(self, turn: Sampled, candidates: PeakCandidates, first: Peaks, size: Array) -> Peaks:
         """Refine peaks; ``size`` (r, n) are the sizes of the curves."""
         place = np.where(self.places(candidates.request), self.target, np.inf)
         tolerance = SEARCHED * self.target * size[candidates[:2]]
         return refine.sharpen(self._sampler(self.family, turn, candidates), first, tolerance, place)
 
-    def _confirm(self, turn: Sampled, candidates: Candidates, peaks: Peaks, size: Array, share: Array) -> None:
+    def _confirm(self, turn: Sampled, candidates: PeakCandidates, peaks: Peaks, size: Array, share: Array) -> None:
         """Replace the peaks that may be the highest by those of the family's precise poses.
 
         ``share`` of a height is the possible effect of rounding.
@@ -250,7 +252,9 @@ class Search:
         rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
         put(peaks, rivals, peak._replace(err_height=peak.err_height + rounding))
 
-    def _rivals(self, turn: Sampled, candidates: Candidates, peaks: Peaks, size: Array) -> tuple[Index, Array, Mask]:
+    def _rivals(
+        self, turn: Sampled, candidates: PeakCandidates, peaks: Peaks, size: Array
+    ) -> tuple[Index, Array, Mask]:
         """Select the peaks that may be the highest; their tolerances, and whether a place depends on which one is."""
         number = candidates.request
         windowed = np.array([request.windowed for request in self.requests])[number]  # those outside are dropped later
@@ -262,7 +266,9 @@ class Search:
         tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & self.places(number[rivals])
         return rivals, np.where(tied, min(self.target, TIE), self.target) * size[rivals], tied
 
-    def _sampler(self, family: Family, turn: Sampled, candidates: Candidates, middle: Array | None = None) -> Sampler:
+    def _sampler(
+        self, family: Family, turn: Sampled, candidates: PeakCandidates, middle: Array | None = None
+    ) -> Sampler:
         """Make a function that evaluates candidates by the poses of ``family``.
 
         An angle is continued from ``middle`` (k,), by default the sample at the candidate.
@@ -287,12 +293,12 @@ class Search:
 
         return sample
 
-    def _rounding(self, turn: Sampled, candidates: Candidates, guards: list[str]) -> Array:
+    def _rounding(self, turn: Sampled, candidates: PeakCandidates, guards: list[str]) -> Array:
         """Share of a value by which rounding may have changed it and its neighbours alike."""
         given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
         return rounding_share(self.family, *given, guards, self._orders(candidates))
 
-    def _orders(self, candidates: Candidates) -> Index:
+    def _orders(self, candidates: PeakCandidates) -> Index:
         """Order of derivative of each candidate; a discriminant rounds like a position."""
         orders = np.array([0 if self.anywhere else order_of(self.family, request.pose) for request in self.requests])
         found: Index = orders[candidates.request]

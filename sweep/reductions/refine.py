@@ -35,7 +35,7 @@ BESIDE = 1e-3 * np.array([-2.0, -1.0, 1.0, 2.0])  # poses next to a place [rad]:
 VARIES = 8.0  # ratio of the rounding at neighbouring poses to that at one pose, at most
 
 
-class Candidates(NamedTuple):
+class PeakCandidates(NamedTuple):
     """Samples next to a possible extremum, each (k,): request, row of the block, column, sign to make it a maximum."""
 
     request: Index
@@ -44,7 +44,7 @@ class Candidates(NamedTuple):
     sign: Array
 
     @classmethod
-    def none(cls) -> Candidates:
+    def none(cls) -> PeakCandidates:
         """Make an empty record."""
         nothing = np.zeros(0, np.int64)
         return cls(nothing, nothing, nothing, np.zeros(0))

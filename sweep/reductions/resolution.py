@@ -199,7 +199,7 @@ class Turns(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Series:
+class FourierCurve:
     """Fourier series of the samples of a smooth curve of expensive poses, with the interface of `FusedCurve`.
 
     Coefficients of a smooth periodic curve decay geometrically.  Their decay predicts the sum of those beyond the
@@ -329,9 +329,9 @@ def _beyond_mean(coefficients: Array) -> Array:
     return found
 
 
-def series_of(family: Family, request: Request) -> Series | None:
+def series_of(family: Family, request: Request) -> FourierCurve | None:
     """Fourier series of a request; None unless the curve is known to be smooth and expensive."""
     known = next((smooth for smooth in family.every(features.Smooth) if smooth.of == request.pose), None)
     if known is None or request.place or request.windowed or features.about(family, features.Switches, known.parts):
         return None
-    return Series(family, request, known.parts) if len(known.parts) == 1 or request.mode >= 0 else None
+    return FourierCurve(family, request, known.parts) if len(known.parts) == 1 or request.mode >= 0 else None

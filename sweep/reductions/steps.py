@@ -18,7 +18,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.reduction import REDUCTIONS, reduction_of
 from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
-from sweep.quantities.kinds import Group, Reduced, Request, WindowAngle, requests
+from sweep.quantities.kinds import GeneralRoute, Reduced, Request, WindowAngle, requests
 from sweep.quantities.resolve import resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import curve_of
@@ -243,7 +243,9 @@ def _beyond(family: Family) -> dict[str, Beyond]:
     return found
 
 
-def group_ns(family: Family, group: Group, names: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> float:
+def group_ns(
+    family: Family, group: GeneralRoute, names: Sequence[str], accuracy: Accuracy, windowed: bool = False
+) -> float:
     """Estimate the time of a general route [ns per design] from measured times of poses and of searches."""
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
@@ -300,7 +302,7 @@ def pose_ns(family: Family) -> float:
     return sum(nanoseconds("poses", stage.family.name) for stage in family.stages)
 
 
-def group_order(family: Family, group: Group, names: Sequence[str]) -> tuple[Work, int]:
+def group_order(family: Family, group: GeneralRoute, names: Sequence[str]) -> tuple[Work, int]:
     """Order of a general route: routes that detect non-rotatable designs first, then those with the fewest extrema."""
     asked = [resolve(family, name) for name in names]
     beyond = next((found for one in asked if (found := beyond_motion(family, one.of)).name), None)

@@ -18,7 +18,7 @@ from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset
 from sweep.report.front import Front
-from sweep.report.quantities import Quantity, change, number, quantity, rpm
+from sweep.report.quantities import ShownQuantity, change, number, quantity, rpm
 from sweep.report.tables import (
     ACTIVE,
     LimitState,
@@ -65,10 +65,7 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
     sentences += [] if cut else search_warnings(data)
     # A prescribed output is met by construction if [locus] fixes it, and part of the searched space if it is an axis.
     states = [s for s in limit_states(data) if s.shown.name not in data.study.prescribed]
-    tolerance = data.study.tolerance
-    sentences += _limit_sentences(
-        states, data.optimum is not None and tolerance is not None and tolerance.robust is not None
-    )
+    sentences += _limit_sentences(states, data.optimum is not None and data.study.wanted_yield is not None)
     sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, scanned)
     front = Front.of(data)
@@ -78,7 +75,7 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
     return [s for s in sentences if s]
 
 
-def _headline(data: Dataset, who: str, shown: Quantity) -> str:
+def _headline(data: Dataset, who: str, shown: ShownQuantity) -> str:
     value, old = value_of(data.result, shown.name), value_of(data.reference, shown.name)
     article = "an" if shown.words[0] in "aeiou" else "a"
     text = f"{who} has {article} {shown.words} of {_with_speed(data, shown, value)}"
@@ -99,7 +96,7 @@ def _comparison(data: Dataset, name: str) -> str:
     return f"{text}; the reference has {shown.show(old)} ({difference})." if difference else f"{text}."
 
 
-def _with_speed(data: Dataset, shown: Quantity, value: float) -> str:
+def _with_speed(data: Dataset, shown: ShownQuantity, value: float) -> str:
     fast = shown.at_speed(value, data.study.speed)
     return f"{shown.show(value)} ({fast} at {rpm(data.study.speed)})" if fast else shown.show(value)
 
@@ -139,7 +136,7 @@ def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
         if not residual <= KKT:
             late = data.optimum.get("ended") == "time"
             faults.append(f"the optimiser {'had no time left to settle' if late else 'did not settle'}")
-        wanted_yield = None if data.study.tolerance is None else data.study.tolerance.robust
+        wanted_yield = data.study.wanted_yield
         share = value_of(data.optimum, "yield")
         if wanted_yield is not None and share < wanted_yield:
             faults.append(f"as it is made: {share_words(share, wanted_yield, str(data.optimum.get('ended')))}")
@@ -284,8 +281,7 @@ def _unconfirmed(data: Dataset) -> tuple[str, ...]:
 def _behind_the_front(data: Dataset) -> tuple[str, ...]:
     """Return a warning if a design of the front keeps all limits and is better than the optimum."""
     study, objective, front, best = data.study, data.objective, data.front, data.optimum
-    robust = study.tolerance is not None and study.tolerance.robust is not None
-    if study.pareto is None or objective is None or front is None or best is None or robust:
+    if study.pareto is None or objective is None or front is None or best is None or study.wanted_yield is not None:
         return ()
     good = (front["status"] == codes.OK) & (front["kkt_residual"] <= KKT)
     for limit in study.limits:  # the front's bounds replace limits on its side

@@ -23,7 +23,7 @@ from sweep.families.names import is_largest, is_place, stem
 from sweep.optimise import Survey, read_survey
 from sweep.quantities.kinds import is_windowed
 from sweep.quantities.resolve import find
-from sweep.report.quantities import Quantity, quantity
+from sweep.report.quantities import ShownQuantity, quantity
 from sweep.report.scan import Cells, Scan, divided_axes, scan
 from sweep.study.load import study_of
 
@@ -61,7 +61,7 @@ class Dataset:
     best: Row | None = None
     computed_reference: Row | None = None
 
-    def shown(self, name: str) -> Quantity:
+    def shown(self, name: str) -> ShownQuantity:
         """Return a column's display form."""
         form, family = quantity(name, self.units.get(name, "")), self.study.family
         asked = None if self.study.window is None else find(family, name)
@@ -72,7 +72,7 @@ class Dataset:
         )
 
     @property
-    def objective(self) -> Quantity | None:
+    def objective(self) -> ShownQuantity | None:
         """Display form of the objective; None without an objective."""
         return None if self.study.objective is None else self.shown(self.study.objective.output)
 

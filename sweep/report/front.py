@@ -16,7 +16,7 @@ from sweep.optimise.local.kkt import NO_VALUE
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, records
 from sweep.report.figures import LIMIT, OPTIMUM
-from sweep.report.quantities import Quantity, change, number
+from sweep.report.quantities import ShownQuantity, change, number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,8 +44,8 @@ class Front:
     """The front of a dataset: objective, second output, and a point for each bound, the loosest first."""
 
     data: Dataset
-    objective: Quantity
-    second: Quantity
+    objective: ShownQuantity
+    second: ShownQuantity
     settings: ParetoSettings
     points: list[dict[str, Any]]
 

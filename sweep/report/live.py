@@ -20,17 +20,17 @@ from sweep.dataset.chunk_files import batches
 from sweep.errors import InputError
 from sweep.evaluation.curves import coordinate, motion_curves
 from sweep.evaluation.joints import Part, parts
-from sweep.exchange.scene import Placed, extent, is_spatial, shown_name, side_by_side
+from sweep.exchange.scene import PlacedPart, extent, is_spatial, shown_name, side_by_side
 from sweep.families.base import Angles, Array, Family, Interval, equal_steps
 from sweep.families.names import is_flag, is_largest, reduced, stem
 from sweep.quantities.limits import compared
 from sweep.report.optima import shown_designs
-from sweep.report.quantities import Quantity, quantity
+from sweep.report.quantities import ShownQuantity, quantity
 from sweep.report.tables import limited
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
-    from sweep.report.optima import Group, Shown
+    from sweep.report.optima import DistinctOptimum, Shown
     from sweep.report.scan import Cells
     from sweep.study import Limit
 
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 SPATIAL, PLANE = ("live/three.min.js", "live/view.js"), ("live/charts.js", "live/lines.js", "live/page.js")
 
 
-def live(data: Dataset, cells: Sequence[Cells], different: Sequence[Group]) -> dict[str, Any]:
+def live(data: Dataset, cells: Sequence[Cells], different: Sequence[DistinctOptimum]) -> dict[str, Any]:
     """Return the template's variables for both interactive sections as JSON, empty if there is nothing to show."""
     designs = shown_designs(data, different)
     motion = moving(data, designs)
@@ -140,7 +140,7 @@ class Motion:
     from_lowest: bool
     curves: dict[str, Array]
     inside: NDArray[np.bool_]
-    placed: tuple[Placed, ...]
+    placed: tuple[PlacedPart, ...]
 
 
 def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
@@ -188,7 +188,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     return Motion(shown, phi[order], from_lowest, curves, inside, _placed(family, design, phi, order))
 
 
-def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Placed, ...]:
+def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[PlacedPart, ...]:
     """Return stages and members with their joints in the order of the poses; a march is computed in its own order."""
     try:
         stages = parts(family, design, phi)
@@ -241,7 +241,7 @@ def _design(data: Dataset, motion: Motion, factor: float) -> dict[str, Any]:
     }
 
 
-def _part(one: Placed) -> dict[str, Any]:
+def _part(one: PlacedPart) -> dict[str, Any]:
     """Return joints over the poses, fixed ones once, with axes, kinds and links by the names that the page shows."""
     part: Part = one.part
     name = {joint: f"{shown_name(joint)}{part.stage}" for joint in part.joints}
@@ -305,7 +305,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     }
 
 
-def _axes(data: Dataset, cells: Sequence[Cells]) -> list[Quantity]:
+def _axes(data: Dataset, cells: Sequence[Cells]) -> list[ShownQuantity]:
     """Return the axes: swept dimensions, objective and limited outputs; without an objective the wanted outputs."""
     study = data.study
     objective = study.want if study.objective is None else [study.objective.output]

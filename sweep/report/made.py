@@ -25,7 +25,7 @@ from sweep.optimise.manufacture.tolerance import (
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Dataset, records
-from sweep.report.quantities import Quantity, number, quantity
+from sweep.report.quantities import ShownQuantity, number, quantity
 from sweep.study import Limit
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class Histogram:
     counts it.
     """
 
-    shown: Quantity
+    shown: ShownQuantity
     edges: Array
     shares: Array
     low: float | None
@@ -63,7 +63,7 @@ class Histogram:
         return (middle < low) | (middle > high)
 
 
-class Made(NamedTuple):
+class YieldSummary(NamedTuple):
     """Yield of the result, histogram of the limit missed most, and cost of the dimensions' tolerances."""
 
     share: float
@@ -84,14 +84,14 @@ def toleranced(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -
     return design, sampled_designs(study.family, design, study.tolerance, study.optimise.seed, samples)
 
 
-def made(data: Dataset) -> Made | None:
+def made(data: Dataset) -> YieldSummary | None:
     """Return the yield of the optimum; None without tolerances, an optimum, or an inequality limit."""
     sample = _manufactured(data)
     if sample is None:
         return None
     limits = [limit for limit in limits_of_made(data.study) if limit.output == sample.output]
     worst = min(limits, key=lambda limit: float(meets(limit, sample.values).mean()))
-    return Made(float(sample.kept.mean()), _histogram(data, worst, sample.values), sample.costs)
+    return YieldSummary(float(sample.kept.mean()), _histogram(data, worst, sample.values), sample.costs)
 
 
 def _manufactured(data: Dataset) -> Manufactured | None:
@@ -109,7 +109,7 @@ def _design(data: Dataset, row: Mapping[str, Any]) -> Array:
     return np.array([float(row[name]) for name in data.study.family.parameter_names])
 
 
-def made_sentence(result: Made | None, tolerance: str) -> str:
+def made_sentence(result: YieldSummary | None, tolerance: str) -> str:
     """Return a sentence about the yield and the most expensive tolerance, for the answer."""
     if result is None:
         return ""
@@ -161,7 +161,7 @@ def _histogram(data: Dataset, limit: Limit, column: NDArray[np.generic]) -> Hist
 class Spread(NamedTuple):
     """Distribution of an output over manufactured mechanisms; ``within`` is the share that keeps its limit, or nan."""
 
-    shown: Quantity
+    shown: ShownQuantity
     nominal: float
     low: float
     mean: float

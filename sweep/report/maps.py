@@ -13,7 +13,7 @@ from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, marked
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
 from sweep.report.front import Front
-from sweep.report.quantities import Quantity
+from sweep.report.quantities import ShownQuantity
 from sweep.report.scan import Cells, Scan, most_telling
 
 if TYPE_CHECKING:
@@ -43,10 +43,10 @@ class Overlay:
 
 def map_figure(
     grid: Grid,
-    x: tuple[Cells, Quantity],
-    y: tuple[Cells, Quantity],
+    x: tuple[Cells, ShownQuantity],
+    y: tuple[Cells, ShownQuantity],
     designs: float,
-    objective: Quantity | None,
+    objective: ShownQuantity | None,
     marks: dict[str, tuple[float, float]],
     overlays: Sequence[Overlay],
 ) -> Figure:
@@ -97,7 +97,7 @@ def map_figure(
 
 
 def line_figure(
-    line: Grid, x: tuple[Cells, Quantity], designs: float, objective: Quantity | None, marks: dict[str, float]
+    line: Grid, x: tuple[Cells, ShownQuantity], designs: float, objective: ShownQuantity | None, marks: dict[str, float]
 ) -> Figure:
     """Draw the same as :func:`map_figure` over the only axis that a study sweeps."""
     cells, shown = x
@@ -236,7 +236,7 @@ def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str
     return None
 
 
-def axis_quantity(data: Dataset, name: str) -> Quantity:
+def axis_quantity(data: Dataset, name: str) -> ShownQuantity:
     """Return the display form of a swept parameter under its own name."""
     shown = data.shown(name)
     return replace(shown, symbol=name, words=data.definitions.get(name, name))

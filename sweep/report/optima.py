@@ -36,7 +36,7 @@ SAME = 1e-6  # relative difference below which objectives are equal
 
 
 @dataclass(frozen=True)
-class Group:
+class DistinctOptimum:
     """Starts that ended in the same design or its mirror image: representative row, and number of starts."""
 
     row: dict[str, Any]
@@ -50,7 +50,7 @@ class Group:
         return "optimum" if self.row["role"] == "optimum" else f"another optimum, {k}"
 
 
-def groups(data: Dataset) -> list[Group]:
+def groups(data: Dataset) -> list[DistinctOptimum]:
     """Return the different optima: the answer, the best nominal one, the others by objective; none without a search."""
     if data.optima is None or data.objective is None:
         return []
@@ -71,7 +71,7 @@ def groups(data: Dataset) -> list[Group]:
         count[k if leader is None else leader] += started
         if twin is not None:
             mirrored[twin] += started
-    return [Group(rows[k], count[k], mirrored[k]) for k in leaders]
+    return [DistinctOptimum(rows[k], count[k], mirrored[k]) for k in leaders]
 
 
 def _places(data: Dataset, rows: list[dict[str, Any]]) -> tuple[Array, Array, Array]:
@@ -116,7 +116,7 @@ class Shown:
     row: Row
 
 
-def shown_designs(data: Dataset, different: Sequence[Group]) -> list[Shown]:
+def shown_designs(data: Dataset, different: Sequence[DistinctOptimum]) -> list[Shown]:
     """Return the designs in the order in which the page lists them; empty if no design was found.
 
     ``different`` are the optima of :func:`groups`, the study's answer first.
@@ -176,7 +176,7 @@ class Optimum:
     picture: Markup | None
 
 
-def optima(data: Dataset, distinct: list[Group]) -> list[Optimum]:
+def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[Optimum]:
     """Return the cards of the first optima, with pictures to one scale; empty if there is only one."""
     objective, names = data.objective, data.study.bare.parameter_names
     tilts = {name for name in names if name.endswith("_tilt")}  # tilts of nominal designs are zero
@@ -207,7 +207,7 @@ def optima(data: Dataset, distinct: list[Group]) -> list[Optimum]:
     return cards
 
 
-def optima_sentence(data: Dataset, distinct: list[Group]) -> str:
+def optima_sentence(data: Dataset, distinct: list[DistinctOptimum]) -> str:
     """Return a sentence about the number of different optima, for the answer."""
     objective = data.objective
     if len(distinct) < 2 or objective is None:

@@ -45,7 +45,7 @@ _SIZE = re.compile("(speed|acceleration|jerk)_([a-z])")  # of a point's motion i
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ShownQuantity:
     """Display form of a dataset's column.
 
     ``symbolic`` says that the symbol differs from the name.  ``factor`` converts the stored value (mm, rad) to
@@ -100,7 +100,7 @@ def with_unit(text: str, unit: str) -> str:
 
 
 @lru_cache(maxsize=4096)  # the page of a slider needs the same forty names at every step
-def quantity(name: str, unit: str) -> Quantity:
+def quantity(name: str, unit: str) -> ShownQuantity:
     """Return the display form of the column ``name``, stored in ``unit`` ("mm" or "length", "rad", "1" ...)."""
     unit = internal_unit(unit)
     if of := without_minus(name):  # a maximised output is shown itself
@@ -108,7 +108,9 @@ def quantity(name: str, unit: str) -> Quantity:
         return replace(shown, name=name, factor=-shown.factor, speed_scale=-shown.speed_scale)
     if is_error(name):
         shown = quantity(without_error(name), unit)
-        return Quantity(name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, abs(shown.factor))
+        return ShownQuantity(
+            name, f"error of {shown.symbol}", f"error of the {shown.words}", shown.unit, abs(shown.factor)
+        )
     if member := parts(name).member:
         shown = quantity(name.removeprefix(f"{member}."), unit)
         return replace(shown, name=name, symbol=f"{shown.symbol} {member}", words=f"{shown.words} of the {member}")
@@ -125,12 +127,12 @@ def quantity(name: str, unit: str) -> Quantity:
     length = unit in LENGTHS
     order = order if length or unit in ("1", "rad") else 0  # a force called ds is no derivative
     if is_place(name) or (order == 0 and unit in ("rad", "angle")):
-        return Quantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
+        return ShownQuantity(name, symbol, words, "°", math.degrees(1.0), symbolic)
     if order == 0:
         kind = {"s": "life", "rad/s": "speed"}.get(unit, "")  # if the name contains the kind
         read, factor = READ_IN.get(kind if kind and kind in name else unit, (_pretty_unit(unit), 1.0))
-        return Quantity(name, symbol, words, read, factor, symbolic)
-    return Quantity(
+        return ShownQuantity(name, symbol, words, read, factor, symbolic)
+    return ShownQuantity(
         name,
         symbol,
         words,
@@ -204,7 +206,7 @@ SUPERSCRIPTS = str.maketrans("0123456789−", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 SIGNED = re.compile(r"(max|min)_(?!abs_)")
 
 
-def change(shown: Quantity, new: float, old: float) -> str:
+def change(shown: ShownQuantity, new: float, old: float) -> str:
     """Compare a value with another: sizes in percent, angles and values of changing sign by their difference."""
     signed = bool(SIGNED.match(shown.name)) and min(new, old) < 0.0
     if shown.unit != "°" and not signed:

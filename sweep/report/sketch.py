@@ -16,7 +16,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
 from sweep.exchange.scene import (
-    Placed,
+    PlacedPart,
     exists,
     extent,
     first_pose,
@@ -44,7 +44,7 @@ NEAR = 1e-7  # share of the mechanism's size below which a distance equals a dim
 TELLING = 1e-3  # relative change of dimensions that distinguishes equal ones
 
 
-def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Placed]:
+def drawn_parts(family: Family, design: Mapping[str, float]) -> list[PlacedPart]:
     """Return joints and links of a design over one turn, frames side by side; empty without joints or poses."""
     try:
         parts = over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
@@ -53,7 +53,7 @@ def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Placed]:
     return side_by_side(parts) if exists(parts) else []
 
 
-def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Placed]) -> dict[str, Array]:
+def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[PlacedPart]) -> dict[str, Array]:
     """Return the ends, (2, 3), of the lengths that appear in a position as the distance of two points.
 
     A length is identified by a distance that follows it, when all lengths are changed slightly by different shares.
@@ -95,7 +95,7 @@ def _points(part: Part, pose: int) -> dict[str, Array]:
 
 
 def sketch(
-    placed: Sequence[Placed], title: str, dimensions: Mapping[str, Array] | None = None, *, names: bool = True,
+    placed: Sequence[PlacedPart], title: str, dimensions: Mapping[str, Array] | None = None, *, names: bool = True,
     span: float = 0.0,
 ) -> Markup:  # fmt: skip
     """Draw a mechanism as SVG in the colours of the page, from a corner if it is spatial, otherwise from the front.

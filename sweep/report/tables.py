@@ -15,7 +15,7 @@ from sweep.families.names import error_of, is_flag, is_place, without_minus
 from sweep.optimise.local.descent import KKT
 from sweep.quantities.limits import compared, meets
 from sweep.report.dataset import Row
-from sweep.report.quantities import Quantity, change, number, quantity
+from sweep.report.quantities import ShownQuantity, change, number, quantity
 
 if TYPE_CHECKING:
     from sweep.report.dataset import Dataset
@@ -34,7 +34,7 @@ class LimitState:
     ``room`` is the distance to the limit relative to its size, negative if it is missed.
     """
 
-    shown: Quantity
+    shown: ShownQuantity
     bound: str
     value: str
     reference: str
@@ -43,14 +43,14 @@ class LimitState:
     room: float = 0.0
 
 
-def limited(data: Dataset, name: str) -> Quantity:
+def limited(data: Dataset, name: str) -> ShownQuantity:
     """Return the display form of a limited output; a parameter keeps its own name."""
     shown = data.shown(name)
     return replace(shown, symbol=name, words=name) if name in data.study.family.parameter_names else shown
 
 
 def limit_state(
-    limit: Limit, row: Row | None, reference: Row | None, shown: Quantity, active_names: frozenset[str],
+    limit: Limit, row: Row | None, reference: Row | None, shown: ShownQuantity, active_names: frozenset[str],
     settled: bool = False,
 ) -> LimitState:  # fmt: skip
     """Return whether a design keeps a limit, and its distance from it.
@@ -90,7 +90,7 @@ def limit_state(
     )
 
 
-def bound_words(limit: Limit, shown: Quantity) -> str:
+def bound_words(limit: Limit, shown: ShownQuantity) -> str:
     """Return a limit as ``at most 45°`` or ``24.4 to 24.6 mm``."""
     if is_flag(limit.output):
         return "must turn fully"

@@ -22,7 +22,7 @@ REQUIRED_TABLES = ("study", "design")
 
 
 @dataclass(frozen=True)
-class Table:
+class TableModel:
     """Subject of a table, its model, and the model of the entries under its names."""
 
     about: str
@@ -36,36 +36,36 @@ INPUTS = "What the effects of a scene ask for besides the mechanism, and loads o
 COSTS = "What is stored, and what a run may cost."
 
 # Messages and the schema list the tables in this order.
-TABLES: Mapping[str, Table] = {
-    "study": Table("Name, title and question.", StudySection),
-    "mechanism": Table("What the study is about.", MechanismSection),
-    "machine": Table(MACHINE, each=MemberSection),
-    "shafts": Table("Axes that turn with the main shaft, which cranks of members sit on.", each=ShaftSection),
-    "tools": Table("Needles and blades, which gaps and moments are about.", each=ToolSection),
-    "relations": Table(MACHINE, each=RelationSection),
-    "thread": Table(
+TABLES: Mapping[str, TableModel] = {
+    "study": TableModel("Name, title and question.", StudySection),
+    "mechanism": TableModel("What the study is about.", MechanismSection),
+    "machine": TableModel(MACHINE, each=MemberSection),
+    "shafts": TableModel("Axes that turn with the main shaft, which cranks of members sit on.", each=ShaftSection),
+    "tools": TableModel("Needles and blades, which gaps and moments are about.", each=ToolSection),
+    "relations": TableModel(MACHINE, each=RelationSection),
+    "thread": TableModel(
         "The threads of a machine, each from its tensioner over points and take-ups to the stitch.", each=ThreadSection
     ),
-    "scene": Table("Speed, wanted design outputs and the window of the stroke.", SceneSection),
-    "design": Table(DESIGNS),
-    "bodies": Table(INPUTS),
-    "loads": Table(INPUTS, each=CurveSection),
-    "locus": Table("Limit positions of the first stage, from which its links follow."),
-    "fit": Table("The line that a guided point is fitted to.", FitSection),
-    "limits": Table("Bounds of design outputs and of parameters."),
-    "cyclogram": Table("When events of a machine happen and its members stroke: limits of crank angles."),
-    "objective": Table("The design output to be made small, or large.", ObjectiveSection),
-    "accuracy": Table(
+    "scene": TableModel("Speed, wanted design outputs and the window of the stroke.", SceneSection),
+    "design": TableModel(DESIGNS),
+    "bodies": TableModel(INPUTS),
+    "loads": TableModel(INPUTS, each=CurveSection),
+    "locus": TableModel("Limit positions of the first stage, from which its links follow."),
+    "fit": TableModel("The line that a guided point is fitted to.", FitSection),
+    "limits": TableModel("Bounds of design outputs and of parameters."),
+    "cyclogram": TableModel("When events of a machine happen and its members stroke: limits of crank angles."),
+    "objective": TableModel("The design output to be made small, or large.", ObjectiveSection),
+    "accuracy": TableModel(
         "A relative error of the extrema, or a grid of crank angles; and what is to be proven.", AccuracySection
     ),
-    "optimise": Table("How the optimiser searches.", OptimiseSection),
-    "task": Table("A task of the engineering method, whose mechanisms are where the study's search begins."),
-    "pareto": Table("A second output and the bounds on it, each given once, in its unit.", ParetoSection),
-    "tolerance": Table("How far the lengths and angles of a mechanism that is made may be off.", ToleranceSection),
-    "reference": Table(DESIGNS, ReferenceSection),
-    "output": Table(COSTS, OutputSection),
-    "budget": Table(COSTS, BudgetSection),
-    "report": Table("Figures and curves of the report.", ReportSection),
+    "optimise": TableModel("How the optimiser searches.", OptimiseSection),
+    "task": TableModel("A task of the engineering method, whose mechanisms are where the study's search begins."),
+    "pareto": TableModel("A second output and the bounds on it, each given once, in its unit.", ParetoSection),
+    "tolerance": TableModel("How far the lengths and angles of a mechanism that is made may be off.", ToleranceSection),
+    "reference": TableModel(DESIGNS, ReferenceSection),
+    "output": TableModel(COSTS, OutputSection),
+    "budget": TableModel(COSTS, BudgetSection),
+    "report": TableModel("Figures and curves of the report.", ReportSection),
 }
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from studies.accuracy.ordinary import designs
 from sweep.effects import NAMES, effect, with_effects
-from sweep.effects.base import Placed
+from sweep.effects.base import PlacedEffect
 from sweep.effects.scene import first_scene
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
@@ -60,7 +60,7 @@ def costs(names: Sequence[str] = NAMES, *, n: int = 64, each: bool = False, repe
     rows = [Cost(MOTION, "all", "pose", motion_ns("rssr", n, repeats))]
     for name in names:
         entry = effect(name)
-        full = with_effects(family(entry.families[0]), (Placed(entry),))
+        full = with_effects(family(entry.families[0]), (PlacedEffect(entry),))
         matrix = designs(full, n)
         motion = motion_ns(entry.families[0], n, repeats) if entry.outputs else 0.0
         sets = {"all": frozenset(o.name for o in entry.outputs)} if entry.outputs else {}

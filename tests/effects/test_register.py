@@ -15,7 +15,7 @@ from sweep.cli import main
 from sweep.cli.effects import every_input, grouped, of_any_place, page, parts, places_of
 from sweep.effects import NAMES, applicable, effect, extended, offered
 from sweep.effects.advice import closure, findings, left_out, tree
-from sweep.effects.base import Placed
+from sweep.effects.base import PlacedEffect
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
 from sweep.families.capabilities import JointRecords, ThreadPath
@@ -59,7 +59,7 @@ def test_an_entry_is_complete(name):
     assert entry.name == name
     assert entry.title and entry.formulas and entry.called_for and entry.negligible
     assert entry.ns_per_pose > 0.0 or entry.design_result is not None
-    outputs = Placed(entry).outputs
+    outputs = PlacedEffect(entry).outputs
     for o in outputs:
         assert o.text and o.equation, o.name
     for item in (*outputs, *entry.inputs):

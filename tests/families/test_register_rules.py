@@ -16,7 +16,7 @@ from sweep.families.capabilities import (
     Dimensions,
     JointRecords,
     Link,
-    Made,
+    MovingPoint,
     OutputLink,
     PresserFoot,
     Skeleton,
@@ -32,7 +32,9 @@ def yoke(designs: Any, angles: Any, wanted: frozenset[str]) -> dict[str, Any]:
     return {name: values[name] for name in wanted} | {"status": np.zeros((len(a), angles.cos.shape[1]), np.uint8)}
 
 
-SKELETON = Skeleton({"o": ORIGIN}, (Link("crank", ("o", "p")),), {"p": Made(("s",), lambda d, a, m: np.zeros(1))})
+SKELETON = Skeleton(
+    {"o": ORIGIN}, (Link("crank", ("o", "p")),), {"p": MovingPoint(("s",), lambda d, a, m: np.zeros(1))}
+)
 OUTPUTS = (
     Output("s", "length", "displacement"),
     Output("ds", "length", "ds/dphi"),
@@ -82,7 +84,7 @@ BROKEN = {
         "'q' is no point: name it in points",
     ),
     "point without output": (
-        {"capabilities": (replace(SKELETON, made={"p": Made(("x",), lambda d, a, m: d)}),)},
+        {"capabilities": (replace(SKELETON, moving={"p": MovingPoint(("x",), lambda d, a, m: d)}),)},
         "point p needs 'x', which is no pose output",
     ),
     "no unit": (outputs(s=Output("s", "", "displacement")), "output s: give its unit"),

@@ -16,7 +16,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, pareto
-from sweep.optimise.front.pareto import Front, advance, bounded, gaps, steps
+from sweep.optimise.front.pareto import FrontSearch, advance, bounded, gaps, steps
 from sweep.study import Limit, OptimiseSettings, ParetoSettings
 from tests.support.optimise_family import FAMILY
 
@@ -109,7 +109,7 @@ def test_a_tighter_bound_lends_its_better_design_to_a_looser_one() -> None:
     asked = settings("max_pressure_angle", 1.2, 0.9)
     good = minimise(problem, starts, OptimiseSettings())[0]
     bad = replace(good, design=starts[1], objective=good.objective * 2.0)
-    begun = replace(Front.of(asked), results=(bad, good), found=(0, 1), taken=2)
+    begun = replace(FrontSearch.of(asked), results=(bad, good), found=(0, 1), taken=2)
     *_, front = advance(problem, asked, begun, starts[:1])
     loose, tight = (result for _, result in front.known())
     assert front.complete and front.found[0] == 2
@@ -120,7 +120,7 @@ def test_a_tighter_bound_lends_its_better_design_to_a_looser_one() -> None:
 def test_going_on_half_way_gives_the_same_front() -> None:
     problem, starts = linkage()
     asked = settings("max_pressure_angle", 0.9, 0.8, 0.7)
-    states = list(advance(problem, asked, Front.of(asked), starts))
+    states = list(advance(problem, asked, FrontSearch.of(asked), starts))
     assert len(states) == len(steps(3)) and states[-1].complete
     for state in states[1:4]:
         *_, again = advance(problem, asked, state, starts)
@@ -134,7 +134,7 @@ def test_budget_and_stop_leave_the_front_so_far() -> None:
     asked = settings("max_abs_swell", 1.0, 0.5)
     assert len(pareto(bowl(), asked, BOWL_START, stop=lambda: True)) == 1
     assert len(pareto(bowl(), replace(asked, time_budget=1e-9), BOWL_START)) == 1
-    *_, last = advance(bowl(), asked, Front.of(asked), BOWL_START, stop=lambda: True)
+    *_, last = advance(bowl(), asked, FrontSearch.of(asked), BOWL_START, stop=lambda: True)
     assert last.taken == 0 and not last.complete
 
 
@@ -147,14 +147,14 @@ def test_second_output_that_cannot_be_is_named(output: str, message: str) -> Non
 def test_step_cut_short_by_the_brake_is_taken_again() -> None:
     problem, starts = linkage()
     asked = settings("max_pressure_angle", 0.9, 0.8)
-    *_, whole = advance(problem, asked, Front.of(asked), starts)
-    *_, cut = advance(problem, replace(asked, time_budget=1e-9), Front.of(asked), starts)
+    *_, whole = advance(problem, asked, FrontSearch.of(asked), starts)
+    *_, cut = advance(problem, replace(asked, time_budget=1e-9), FrontSearch.of(asked), starts)
     assert cut.taken == 0 and cut.known()[0][1].ended == "time"
     *_, again = advance(problem, asked, replace(cut, results=(None, None), found=(-1, -1)), starts)
     assert [r.objective for _, r in again.known()] == [r.objective for _, r in whole.known()]
 
 
-def between(front: Front, bends: Callable[[np.ndarray], np.ndarray]) -> float:
+def between(front: FrontSearch, bends: Callable[[np.ndarray], np.ndarray]) -> float:
     """Largest error of the front drawn as a polygon, over all bounds from the tightest to the loosest."""
     bounds, values = (np.array(x) for x in zip(*[(b, r.objective) for b, r in front.known()], strict=True))
     dense = np.linspace(min(bounds), max(bounds), 2000)
@@ -162,8 +162,8 @@ def between(front: Front, bends: Callable[[np.ndarray], np.ndarray]) -> float:
     return float(np.abs(np.interp(dense, bounds[order], values[order]) - bends(dense)).max())
 
 
-def last(problem: Problem, asked: ParetoSettings, starts: np.ndarray) -> Front:
-    *_, front = advance(problem, asked, Front.of(asked), starts)
+def last(problem: Problem, asked: ParetoSettings, starts: np.ndarray) -> FrontSearch:
+    *_, front = advance(problem, asked, FrontSearch.of(asked), starts)
     return front
 
 
@@ -187,7 +187,7 @@ def test_bounds_are_placed_where_the_front_bends() -> None:
 def test_placed_bounds_go_on_half_way_to_the_same_bits() -> None:
     problem, starts = linkage()
     asked = settings("max_pressure_angle", 0.9, 0.6, points=5)
-    states = list(advance(problem, asked, Front.of(asked), starts))
+    states = list(advance(problem, asked, FrontSearch.of(asked), starts))
     assert [state.taken for state in states] == list(range(1, len(steps(2)) + 4))
     assert states[-1].complete and len(states[-1].bounds) == 5
     for state in (states[0], states[-3], states[-2]):
@@ -216,7 +216,7 @@ def test_flat_front_gets_no_further_points() -> None:
 
 def test_placing_stops_when_asked_and_keeps_what_is_finished() -> None:
     asked, calls = settings("max_abs_swell", 4.0, 0.05, points=9), itertools.count()
-    states = list(advance(bowl(), asked, Front.of(asked), BOWL_START, lambda: next(calls) > 60))
+    states = list(advance(bowl(), asked, FrontSearch.of(asked), BOWL_START, lambda: next(calls) > 60))
     assert not states[-1].complete
     kept = max((state for state in states if state.taken < 12), key=lambda state: state.taken)
     *_, again = advance(bowl(), asked, kept, BOWL_START)

@@ -26,7 +26,7 @@ from sweep.optimise.starts import global_starts, populations
 from sweep.optimise.starts.dataset import kinds, random_designs
 from sweep.optimise.starts.global_starts import from_populations
 from sweep.optimise.starts.linear import POSES, TURN, Elimination, elimination
-from sweep.optimise.starts.populations import Population, Size
+from sweep.optimise.starts.populations import Population, PopulationSize
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import Study, study_from_data
@@ -220,7 +220,7 @@ def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest
     assert np.isfinite(worth[64]).mean() > 0.9 and np.median(worth[64]) < 0.5 * np.median(worth[1])
 
 
-SMALL = Size(sampled=1 << 13, first=12, later=6, generations=1, first_steps=4, steps=8)
+SMALL = PopulationSize(sampled=1 << 13, first=12, later=6, generations=1, first_steps=4, steps=8)
 
 
 def same(one: Population, other: Population) -> None:

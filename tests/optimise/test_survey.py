@@ -11,7 +11,7 @@ import pytest
 
 from kernels import status as st
 from sweep.optimise import Survey, explore
-from sweep.optimise.multistart.survey import GROUP_SIZE, Group, in_groups, survey, wanted, with_basins
+from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup, in_groups, survey, wanted, with_basins
 from sweep.study import OptimiseSettings, load_study
 from tests.optimise.test_study import STUDY
 from tests.support.starts import bowl, populations_ended_at, result
@@ -31,13 +31,13 @@ def test_values_within_a_ten_thousandth_are_one_basin_and_infeasible_ends_are_no
 
 def test_unseen_share_is_the_larger_of_good_turing_and_boender_rinnooy_kan() -> None:
     values = [1.0] * 6 + [2.0] * 3 + [3.0]
-    found = survey(bowl(), [Group(starts(10))], [result(k, x) for k, x in enumerate(values)], ASKED, "starts")
+    found = survey(bowl(), [StartGroup(starts(10))], [result(k, x) for k, x in enumerate(values)], ASKED, "starts")
     # One of ten was met once; 3 * 4 / (10 * 9) is larger.
     assert (found.basins, found.best) == (3, 6) and found.unseen == pytest.approx(12 / 90)
     chance = "another start finds a new one with an estimated chance of 13 %"
     assert found.words == f"3 local optima found, the best from 6 distinct starts; {chance}"
     singles = [result(k, 1.0 if k < 8 else float(k)) for k in range(12)]
-    assert survey(bowl(), [Group(starts(12))], singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
+    assert survey(bowl(), [StartGroup(starts(12))], singles, ASKED, "starts").unseen == pytest.approx(4 / 12)
 
 
 POPULATIONS = replace(ASKED, globally="proportions", populations=50)
@@ -47,7 +47,7 @@ def test_of_a_population_the_best_end_counts_alone() -> None:
     values = [9.0, 1.0, 2.0, 1.0, 3.0, 1.0, 4.0]
     ends, some = [result(k, x) for k, x in enumerate(values)], starts(7)
     # Three populations, all of which ended in the best basin; their other ends, and a start of the sweep, do not count.
-    groups = [Group(some[:1], counted=0), *(Group(some[k : k + 2], k, 1) for k in (1, 3, 5))]
+    groups = [StartGroup(some[:1], counted=0), *(StartGroup(some[k : k + 2], k, 1) for k in (1, 3, 5))]
     found = survey(bowl(), groups, ends, replace(POPULATIONS, unseen=0.02), "starts")
     assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
     assert found.populations == 3 and not found.enough
@@ -62,9 +62,9 @@ def test_of_a_population_the_best_end_counts_alone() -> None:
 def test_starts_of_different_samples_are_distinct_wherever_they_stand() -> None:
     alike = np.tile(starts(1), (12, 1)) + 1e-4 * np.arange(12)[:, None] * np.array([1.0, 1.0, 0.0, 0.0])
     ends = [result(k, 1.0) for k in range(12)]
-    together = survey(bowl(), [Group(alike)], ends, ASKED, "starts")
+    together = survey(bowl(), [StartGroup(alike)], ends, ASKED, "starts")
     assert together.best == 1 and not together.enough
-    samples = [Group(alike[4 * k : 4 * k + 4], k) for k in range(3)]
+    samples = [StartGroup(alike[4 * k : 4 * k + 4], k) for k in range(3)]
     apart = survey(bowl(), samples, ends, ASKED, "starts")
     assert apart.best == 3 and apart.enough
     found, told, _ = explore(bowl(), samples, ASKED)
@@ -102,7 +102,9 @@ def test_unseen_share_is_no_smaller_than_what_random_searches_leave() -> None:
     for _ in range(1000):
         volumes = rng.dirichlet(np.ones(6))
         ends = rng.choice(6, 18, p=volumes)
-        found = survey(bowl(), [Group(starts(18))], [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts")
+        found = survey(
+            bowl(), [StartGroup(starts(18))], [result(k, 1.0 + x) for k, x in enumerate(ends)], ASKED, "starts"
+        )
         estimated.append(found.unseen)
         happened.append(1.0 - volumes[np.unique(ends)].sum())
     assert np.mean(estimated) >= np.mean(happened)
@@ -111,14 +113,16 @@ def test_unseen_share_is_no_smaller_than_what_random_searches_leave() -> None:
 def test_starts_beside_each_other_count_once() -> None:
     close = np.repeat(starts(1), 12, axis=0) + np.linspace(0.0, 1e-3, 12)[:, None] * [1, 1, 0, 0]
     ends = [result(k, 1.0) for k in range(12)]
-    assert survey(bowl(), [Group(close)], ends, ASKED, "starts").best == 1
-    assert not survey(bowl(), [Group(close)], ends, ASKED, "starts").enough
-    assert survey(bowl(), [Group(starts(12))], ends, ASKED, "starts").enough
+    assert survey(bowl(), [StartGroup(close)], ends, ASKED, "starts").best == 1
+    assert not survey(bowl(), [StartGroup(close)], ends, ASKED, "starts").enough
+    assert survey(bowl(), [StartGroup(starts(12))], ends, ASKED, "starts").enough
 
 
 def test_one_start_or_none_feasible_says_nothing_of_the_rest() -> None:
-    assert survey(bowl(), [Group(starts(1))], [result(0, 1.0)], ASKED, "starts").unseen == 1.0
-    nothing = survey(bowl(), [Group(starts(2))], [result(k, 1.0, st.LIMIT_EXCEEDED) for k in range(2)], ASKED, "starts")
+    assert survey(bowl(), [StartGroup(starts(1))], [result(0, 1.0)], ASKED, "starts").unseen == 1.0
+    nothing = survey(
+        bowl(), [StartGroup(starts(2))], [result(k, 1.0, st.LIMIT_EXCEEDED) for k in range(2)], ASKED, "starts"
+    )
     assert nothing.unseen == 1.0 and nothing.basins == 0
     assert nothing.words == "none led to a design within all limits"
 
@@ -164,7 +168,7 @@ def test_signs_have_basins_of_their_own() -> None:
     both = starts(6)
     both[3:, 3] = -1.0
     ends = [result(k, 1.0 if k < 4 else 2.0) for k in range(6)]
-    found = survey(bowl(), [Group(both)], ends, ASKED, "starts")
+    found = survey(bowl(), [StartGroup(both)], ends, ASKED, "starts")
     assert found.kinds == (("branch = -1", 3, 2), ("branch = 1", 3, 1))
     assert math.isclose(found.unseen, 6 / 30)
 
@@ -182,5 +186,5 @@ def test_listed_angles_are_in_degrees() -> None:
     p, q, r, branch = problem.family.parameters
     family = replace(problem.family, parameters=(p, q, replace(r, unit="angle"), branch))
     ends = [result(k, 1.0) for k in range(4)]
-    found = survey(replace(problem, family=family), [Group(both)], ends, ASKED, "starts")
+    found = survey(replace(problem, family=family), [StartGroup(both)], ends, ASKED, "starts")
     assert [words for words, *_ in found.kinds] == ["r = 0 deg", "r = 60 deg"]

@@ -10,13 +10,13 @@ import numpy as np
 
 from kernels import status as st
 from sweep.optimise import Problem, Result, Survey
-from sweep.optimise.multistart.survey import Group, survey
+from sweep.optimise.multistart.survey import StartGroup, survey
 from sweep.optimise.starts.samples import samples
 from sweep.study import OptimiseSettings
 from tests.support.optimise_family import FAMILY
 
 
-def gathered(groups: Iterable[Group]) -> tuple[np.ndarray, tuple[int, ...]]:
+def gathered(groups: Iterable[StartGroup]) -> tuple[np.ndarray, tuple[int, ...]]:
     """Return the starts (k, P) of some groups, and the number of each start's sample."""
     found = list(groups)
     return np.concatenate([group.designs for group in found]), tuple(g.source for g in found for _ in g.designs)
@@ -40,5 +40,5 @@ def result(start: int, objective: float, status: int = st.OK, ended: str = "conv
 def populations_ended_at(values: Sequence[float], settings: OptimiseSettings) -> Survey:
     """Return the survey of populations that ended at these values; a value that is not finite is infeasible."""
     ends = [result(k, x, st.OK if math.isfinite(x) else st.LIMIT_EXCEEDED) for k, x in enumerate(values)]
-    groups = [Group(np.zeros((1, 4)), k, 1) for k in range(len(values))]
+    groups = [StartGroup(np.zeros((1, 4)), k, 1) for k in range(len(values))]
     return survey(bowl(), groups, ends, replace(settings, globally="proportions"), "")

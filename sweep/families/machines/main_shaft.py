@@ -35,7 +35,7 @@ _RATE = {"reduced_inertia": 2, "dreduced_inertia": 3, "drive_torque": 1, "drive_
 
 
 @dataclass(frozen=True)
-class Driven:
+class DrivenMember:
     """A member, the number of its first stage if it has several, and its turns per turn of the main shaft."""
 
     member: str
@@ -54,7 +54,7 @@ class ShaftTorque(Relation):
     ``rubs``: friction of all members is known.
     """
 
-    driven: tuple[Driven, ...]
+    driven: tuple[DrivenMember, ...]
     rubs: bool
 
     @property

@@ -16,7 +16,7 @@ from sweep.families.frames import crank_axis
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines.happenings import check_happenings
 from sweep.families.machines.machine import Machine, assemble
-from sweep.families.machines.main_shaft import Driven, ShaftTorque
+from sweep.families.machines.main_shaft import DrivenMember, ShaftTorque
 from sweep.families.machines.pressing import read_pressing
 from sweep.families.machines.relations import (
     Distance,
@@ -326,7 +326,9 @@ def _shaft_torque(name: str, listed: list[tuple[str, str]], members: Mapping[str
         for member, _ in listed
         for stage in (s.family for s in members[member].family.stages)
     )
-    return ShaftTorque(name, tuple(Driven(member, stage, members[member].ratio) for member, stage in listed), rubs)
+    return ShaftTorque(
+        name, tuple(DrivenMember(member, stage, members[member].ratio) for member, stage in listed), rubs
+    )
 
 
 def _shaken(members: Mapping[str, Member], listed: list[tuple[str, str]], where: str) -> Iterator[Shaken]:

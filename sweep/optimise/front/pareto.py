@@ -30,7 +30,7 @@ SHOWN = 0.02  # share of that square above which a gap is reported
 
 
 @dataclass(frozen=True)
-class Front:
+class FrontSearch:
     """Bounds on a second output, the loosest first, with the best result known for each.
 
     ``results`` holds None for a bound not yet searched; ``found`` is the step that found each result; ``taken`` counts
@@ -48,7 +48,7 @@ class Front:
     filled: bool = False
 
     @classmethod
-    def of(cls, settings: ParetoSettings) -> Front:
+    def of(cls, settings: ParetoSettings) -> FrontSearch:
         """Return a front without results."""
         bounds = tuple(sorted(set(settings.bounds), reverse=not settings.at_least))
         none, never = (None,) * len(bounds), (-1,) * len(bounds)
@@ -70,7 +70,7 @@ class Front:
 
 
 @dataclass(frozen=True)
-class Step:
+class FrontStep:
     """Search of bound ``target`` from the result of its neighbour, in the first pass from all starts as well."""
 
     target: int
@@ -78,20 +78,20 @@ class Step:
     first: bool
 
 
-def steps(count: int) -> tuple[Step, ...]:
+def steps(count: int) -> tuple[FrontStep, ...]:
     """List the steps of a front: from the loosest bound to the tightest, back, and to the tightest again.
 
     Each search starts from its neighbour's result, so a good design reaches every bound that it satisfies.
     """
-    tighten = [Step(k, k - 1, first=True) for k in range(count)]
-    loosen = [Step(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
-    tighten_again = [Step(k, k - 1, first=False) for k in range(1, count)]
+    tighten = [FrontStep(k, k - 1, first=True) for k in range(count)]
+    loosen = [FrontStep(k, k + 1, first=False) for k in range(count - 2, -1, -1)]
+    tighten_again = [FrontStep(k, k - 1, first=False) for k in range(1, count)]
     return (*tighten, *loosen, *tighten_again)
 
 
 def searches(settings: ParetoSettings) -> int:
     """Return the largest number of local searches of a front, from the settings alone."""
-    count = len(Front.of(settings).bounds)
+    count = len(FrontSearch.of(settings).bounds)
     placed = max((settings.points or count) - count, 0)
     # Each bound adds the optimum as a start, from the second bound on also the previous result.  A placed bound starts
     # from both neighbours as well, and its result is tried for them.
@@ -142,7 +142,7 @@ def pareto(
     InputError
         if the second output is no design output of the family, or the objective itself, or there is no start.
     """
-    front = Front.of(settings)
+    front = FrontSearch.of(settings)
     for advanced in advance(problem, settings, front, starts, stop, jobs):
         front = advanced
     return [result for _, result in front.known()]
@@ -151,11 +151,11 @@ def pareto(
 def advance(
     problem: Problem,
     settings: ParetoSettings,
-    front: Front,
+    front: FrontSearch,
     starts: Array | Sequence[Array],
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
-) -> Iterator[Front]:
+) -> Iterator[FrontSearch]:
     """Yield the front after each further step; parameters as for :func:`pareto`.
 
     A resumed front takes the same steps as an uninterrupted one, to the bit.  A step cut short by ``stop`` keeps its
@@ -186,11 +186,11 @@ def advance(
 def _with_new_point(
     problem: Problem,
     settings: ParetoSettings,
-    front: Front,
+    front: FrontSearch,
     starts: Sequence[Array],
     should_stop: Callable[[], bool],
     jobs: int,
-) -> tuple[Front, bool]:
+) -> tuple[FrontSearch, bool]:
     """Return the front with one more bound, in the middle of its largest gap, and whether the search was cut short.
 
     The bound is searched from the results of both neighbours and from the starts of the next tighter given bound.  Its
@@ -200,7 +200,7 @@ def _with_new_point(
     if not open_gaps:
         return replace(front, filled=True), False
     index, bound, number = open_gaps[0].number + 1, open_gaps[0].middle, front.taken
-    given = Front.of(settings).bounds
+    given = FrontSearch.of(settings).bounds
     tighter = next(k for k, b in enumerate(given) if (b >= bound if settings.at_least else b <= bound))
     neighbours = [r.design[None, :] for r in (front.results[index - 1], front.results[index]) if r is not None]
     designs = np.concatenate([*neighbours, starts[tighter]])
@@ -212,8 +212,11 @@ def _with_new_point(
         found=(*front.found[:index], -1, *front.found[index:]),
     )
     result = _search(problem, settings, bound, designs[np.sort(first)], should_stop, jobs)
-    front = _with_result(front, Step(index, index - 1, first=True), number, result)
-    for step in (Step(index + 1, index, first=False), *(Step(k, k + 1, first=False) for k in range(index, -1, -1))):
+    front = _with_result(front, FrontStep(index, index - 1, first=True), number, result)
+    for step in (
+        FrontStep(index + 1, index, first=False),
+        *(FrontStep(k, k + 1, first=False) for k in range(index, -1, -1)),
+    ):
         neighbour, present = front.results[step.neighbour], front.results[step.target]
         if neighbour is None or present is None or not neighbour.feasible or should_stop():
             continue
@@ -225,7 +228,7 @@ def _with_new_point(
     return replace(front, taken=number + (not cut)), cut
 
 
-def front_points(problem: Problem, settings: ParetoSettings, front: Front) -> tuple[Array, Array]:
+def front_points(problem: Problem, settings: ParetoSettings, front: FrontSearch) -> tuple[Array, Array]:
     """Return second output and objective of each result; the bound and nan for a bound without a feasible one."""
     reached, values = np.array(front.bounds, np.float64), np.full(len(front.bounds), np.nan)
     feasible = {k: r for k, r in enumerate(front.results) if r is not None and r.feasible}
@@ -239,7 +242,7 @@ def front_points(problem: Problem, settings: ParetoSettings, front: Front) -> tu
 
 
 @dataclass(frozen=True)
-class Gap:
+class FrontGap:
     """Two neighbouring points of a front: number of the looser one, and size of the gap.
 
     The objective can only grow as the bound tightens, so between two points the front lies in the rectangle they span,
@@ -252,7 +255,7 @@ class Gap:
     middle: float
 
 
-def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
+def gaps(bounds: Array, reached: Array, values: Array) -> list[FrontGap]:
     """Return the gaps of a front that a point could fill, the largest first.
 
     Of equal gaps the looser comes first.  Between the bound of a point and its second output the front is flat, so a
@@ -279,11 +282,11 @@ def gaps(bounds: Array, reached: Array, values: Array) -> list[Gap]:
         elif solved[k] or solved[k + 1]:
             rise = 1.0
         if step >= LEAST_WIDTH and 0.5 * step * rise >= LEAST_AREA:
-            fillable.append(Gap(k, 0.5 * step * rise, 0.5 * float(reached[k] + bounds[k + 1])))
+            fillable.append(FrontGap(k, 0.5 * step * rise, 0.5 * float(reached[k] + bounds[k + 1])))
     return sorted(fillable, key=lambda gap: (-gap.area, gap.number))
 
 
-def _step_starts(front: Front, step: Step, number: int, starts: Array) -> Array | None:
+def _step_starts(front: FrontSearch, step: FrontStep, number: int, starts: Array) -> Array | None:
     """Return the starting designs of a step, or None if the neighbour offers nothing new."""
     neighbour = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
     if step.first:
@@ -317,7 +320,7 @@ def _search(
     return replace(results[0], ended="time") if cut and results[0].ended not in CUT else results[0]
 
 
-def _with_result(front: Front, step: Step, number: int, result: Result) -> Front:
+def _with_result(front: FrontSearch, step: FrontStep, number: int, result: Result) -> FrontSearch:
     """Return the front with this result if it is better than the known one."""
     present = front.results[step.target]
     if present is not None and not result.rank < present.rank:

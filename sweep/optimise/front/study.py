@@ -19,7 +19,7 @@ from sweep.evaluation.summaries import output
 from sweep.families.base import Array
 from sweep.families.names import by_magnitude
 from sweep.jobs.progress import Say, unsaid
-from sweep.optimise.front.pareto import Front, advance
+from sweep.optimise.front.pareto import FrontSearch, advance
 from sweep.optimise.multistart.kept import noted, result_of
 from sweep.optimise.starts.posing import problem_of_dataset
 from sweep.optimise.starts.samples import diverse
@@ -74,7 +74,7 @@ def front_study(
         raise MissingInput("pareto", "a [pareto] section", str(study.path))
     dataset = Path(folder)
     settings, path = study.pareto, files.beside(dataset) / files.PARETO
-    front = saved(path, key) or Front.of(settings)
+    front = saved(path, key) or FrontSearch.of(settings)
     if front.complete and path.exists():
         return path
     total = front.steps
@@ -97,14 +97,14 @@ def front_study(
     return path
 
 
-def saved(path: Path, key: str) -> Front | None:
+def saved(path: Path, key: str) -> FrontSearch | None:
     """Return the front that a file holds, or None if there is no file or its key differs."""
     about = metadata(path)
     if about.get(KEY) != key.encode():
         return None
     try:
         state = json.loads(about[STATE])
-        return Front(
+        return FrontSearch(
             tuple(state["bounds"]), tuple(r and result_of(r) for r in state["results"]), tuple(state["found"]),
             state["taken"], state["given"], state["points"], state["filled"],
         )  # fmt: skip
@@ -113,7 +113,13 @@ def saved(path: Path, key: str) -> Front | None:
 
 
 def _write(
-    path: Path, study: Study, settings: ParetoSettings, best: Front, key: str, last_whole: Front, ended: str = ""
+    path: Path,
+    study: Study,
+    settings: ParetoSettings,
+    best: FrontSearch,
+    key: str,
+    last_whole: FrontSearch,
+    ended: str = "",
 ) -> None:
     """Write ``best`` as rows; the search resumes from ``last_whole``, the front after its last finished step."""
     bounds, results = (list(column) for column in zip(*best.known(), strict=True))
@@ -146,7 +152,7 @@ def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Pa
     These are ``optimum`` and diverse good designs of the dataset within the bound.
     """
     chosen = []
-    for designs, merit in best_within(study, settings, Front.of(settings).bounds, folder):
+    for designs, merit in best_within(study, settings, FrontSearch.of(settings).bounds, folder):
         good = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]
         chosen.append(np.concatenate([optimum, good]))
     return chosen

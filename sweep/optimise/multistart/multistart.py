@@ -21,7 +21,16 @@ from sweep.jobs.signals import Deadline, Stop, stop_on_signal
 from sweep.optimise.local.kkt import Result
 from sweep.optimise.local.model import refuse_dependent
 from sweep.optimise.multistart.parallel import SearchTask, spread_over
-from sweep.optimise.multistart.survey import CUT, Group, Survey, counted, in_groups, most_counted, survey, with_basins
+from sweep.optimise.multistart.survey import (
+    CUT,
+    StartGroup,
+    Survey,
+    counted,
+    in_groups,
+    most_counted,
+    survey,
+    with_basins,
+)
 from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import PLACE, Problem
@@ -75,7 +84,7 @@ def minimise(
 
 def explore(
     problem: Problem,
-    groups: Iterable[Group],
+    groups: Iterable[StartGroup],
     settings: OptimiseSettings,
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
@@ -108,7 +117,7 @@ def explore(
         if a worker process was killed.
     """
     deadline = Deadline(settings.time_budget, stop)
-    searched, results, ending = list[Group](), list[Result](), "starts"
+    searched, results, ending = list[StartGroup](), list[Result](), "starts"
     finished: list[Result] = []
 
     def report(*found: Result) -> None:
@@ -150,7 +159,7 @@ def explore(
     return Search(ranked(results), survey(problem, searched, results, settings, ending), problem)
 
 
-def _count_finished(searched: Sequence[Group], results: Sequence[Result]) -> int:
+def _count_finished(searched: Sequence[StartGroup], results: Sequence[Result]) -> int:
     """Return the number of finished starts that count."""
     counts = counted(searched)
     return sum(counts[r.start] for r in results)

@@ -25,7 +25,7 @@ DISTINCT = 0.05  # share of the average distance of two random designs below whi
 CUT = ("time", "interrupted")  # endings of a start whose search was cut short
 
 
-class Group(NamedTuple):
+class StartGroup(NamedTuple):
     """Starts that are searched as one group.
 
     Parameters
@@ -44,13 +44,13 @@ class Group(NamedTuple):
     problem: Problem | None = None
 
 
-def in_groups(starts: Array) -> Iterator[Group]:
+def in_groups(starts: Array) -> Iterator[StartGroup]:
     """Yield starts (k, P) in groups of at most six, independent of the number of jobs."""
     for first in range(0, len(starts), GROUP_SIZE):
-        yield Group(starts[first : first + GROUP_SIZE])
+        yield StartGroup(starts[first : first + GROUP_SIZE])
 
 
-def counted(groups: Sequence[Group]) -> list[bool]:
+def counted(groups: Sequence[StartGroup]) -> list[bool]:
     """Tell for each start of some groups whether it counts."""
     return [group.counted is None or k < group.counted for group in groups for k in range(len(group.designs))]
 
@@ -141,7 +141,7 @@ class Survey:
 
 
 def survey(
-    problem: Problem, groups: Sequence[Group], results: Sequence[Result], settings: OptimiseSettings, ended: str
+    problem: Problem, groups: Sequence[StartGroup], results: Sequence[Result], settings: OptimiseSettings, ended: str
 ) -> Survey:
     """Return the survey of the results of a search.
 

@@ -15,7 +15,7 @@ from kernels import status as st
 from sweep.chunks.parameters import runs_matrix
 from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
-from sweep.optimise.multistart.survey import GROUP_SIZE, Group, in_groups
+from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup, in_groups
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.samples import ALIKE, RANKED, diverse, ranking, samples
 from sweep.quantities.limits import compared
@@ -133,7 +133,7 @@ def swept_and_sampled(
     merit: Array,
     catalogue: Mapping[str, Array],
     stop: Callable[[], bool],
-) -> Iterator[Group]:
+) -> Iterator[StartGroup]:
     """Yield groups of starts: mechanisms of the study's [task], diverse best designs of the sweep, best of samples.
 
     On the locus half of the starts come from samples in any case: they cost next to nothing there, and reach the
@@ -166,7 +166,7 @@ def swept_and_sampled(
 
 def _further_groups(
     study: Study, problem: Problem, designs: Array, ranks: Array, starts: Array, stop: Callable[[], bool]
-) -> Iterator[Group]:
+) -> Iterator[StartGroup]:
     """Yield further groups of starts.
 
     A sample of the problem's own variables finds more than the space of the study, unless [fit] has to complete every
@@ -178,8 +178,8 @@ def _further_groups(
         yield from samples(problem, kinds(study, problem, starts), SAMPLES * count, seed, stop)
     else:
         drawn = random_designs(study, count, seed)
-        yield Group(diverse(problem, drawn, ranking(problem, drawn), count) if len(drawn) else drawn)
-    yield Group(diverse(problem, designs, ranks, count, ALIKE))
+        yield StartGroup(diverse(problem, drawn, ranking(problem, drawn), count) if len(drawn) else drawn)
+    yield StartGroup(diverse(problem, designs, ranks, count, ALIKE))
 
 
 def sample_seconds(problem: Problem, base: Array, count: int) -> float:

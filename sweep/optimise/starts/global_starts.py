@@ -11,7 +11,7 @@ import numpy as np
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, best_words, unsaid
-from sweep.optimise.multistart.survey import Group
+from sweep.optimise.multistart.survey import StartGroup
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import kinds, task_designs
 from sweep.optimise.starts.linear import NEEDED, Elimination, elimination, widened
@@ -29,7 +29,7 @@ DISTINCT_VALUE = 1e-3  # relative difference of values in different basins
 
 def from_populations(
     study: Study, problem: Problem, designs: Array, merit: Array, stop: Callable[[], bool], jobs: int
-) -> Iterator[Group]:
+) -> Iterator[StartGroup]:
     """Yield groups of starts: the best end of each population, and one with another value.
 
     A population counts by the local optimum of its best end, since at fixed poses one basin looks like several.  A few
@@ -51,7 +51,7 @@ def from_populations(
     settings, linear = study.optimise, _elimination(study, problem)
     task_starts = task_designs(study, settings.starts, settings.seed)
     if len(task_starts):
-        yield Group(task_starts, counted=0)
+        yield StartGroup(task_starts, counted=0)
     swept = diverse(problem, designs, merit, settings.starts // SWEPT, ALIKE) if len(merit) else task_starts[:0]
     ends, values = task_starts[:0], list[float]()
     signs = kinds(study, problem, swept)
@@ -60,12 +60,12 @@ def from_populations(
             numbers = [0, *_distinct_values(population.merit, [*values, population.merit[0]], 1)]
             ends = np.concatenate([ends, population.designs[numbers]])
             values += population.merit[numbers].tolist()
-            yield Group(population.designs[numbers], number, 1, enclosing(study, problem, ends))
+            yield StartGroup(population.designs[numbers], number, 1, enclosing(study, problem, ends))
         if len(swept) and merit.min() < min(values, default=math.inf):
-            yield Group(swept, counted=0)
+            yield StartGroup(swept, counted=0)
             swept = swept[:0]
     if len(swept):
-        yield Group(swept, counted=0)
+        yield StartGroup(swept, counted=0)
     elif not len(merit) and not len(task_starts) and not len(ends):
         allowed = "proportions with which the mechanism turns"
         raise InputError("design space", study.space.count, allowed, str(study.path))

@@ -31,7 +31,7 @@ SMALLEST = 1e-3  # swing below which a swing counts as zero [rad]
 USEFUL = 1.3  # multiple of the best value above which ends are no parents
 
 
-class Size(NamedTuple):
+class PopulationSize(NamedTuple):
     """Size of a population.
 
     ``sampled`` proportions for each combination of signs, two to eight per cent of which turn; ``first`` descents in
@@ -47,8 +47,8 @@ class Size(NamedTuple):
     steps: int = 60
 
 
-FULL = Size()
-TINY = Size(1 << 10, 4, 0, 0, 1, 2)  # enough samples of it turn to compile the descents
+FULL = PopulationSize()
+TINY = PopulationSize(1 << 10, 4, 0, 0, 1, 2)  # enough samples of it turn to compile the descents
 
 
 class Population(NamedTuple):
@@ -73,7 +73,7 @@ def breed(
     seed: tuple[int, int],
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
-    size: Size = FULL,
+    size: PopulationSize = FULL,
 ) -> Population:
     """Return the ends of generations of descents from one seed, run in ``jobs`` threads."""
     rows, rng = PoseRows(linear, signs), np.random.default_rng(seed)
@@ -101,7 +101,7 @@ def populations(
     seed: int,
     stop: Callable[[], bool] = lambda: False,
     jobs: int = 1,
-    size: Size = FULL,
+    size: PopulationSize = FULL,
 ) -> Iterator[Population]:
     """Yield independent populations, one after the other, as long as the caller requests them.
 
@@ -121,7 +121,7 @@ def populations(
         yield breed(linear, signs, (seed, number), stop, jobs, size)
 
 
-def _sampled(rows: PoseRows, rng: np.random.Generator, size: Size, jobs: int) -> tuple[Array, Index, Array]:
+def _sampled(rows: PoseRows, rng: np.random.Generator, size: PopulationSize, jobs: int) -> tuple[Array, Index, Array]:
     """Return places and kinds of turning designs of a Sobol sample, diverse good ones of each class of swings.
 
     The third result are the swings of the better quarter.
@@ -202,7 +202,13 @@ def _best_tries(rows: PoseRows, tries: Array, kind: int, jobs: int) -> Array:
 
 
 def _descend(
-    rows: PoseRows, places: Array, kinds: Index, swings: Array, size: Size, stop: Callable[[], bool], jobs: int
+    rows: PoseRows,
+    places: Array,
+    kinds: Index,
+    swings: Array,
+    size: PopulationSize,
+    stop: Callable[[], bool],
+    jobs: int,
 ) -> tuple[list[_End], int]:
     """Return the ends of descents from some places, and their evaluations; the worse half stops after the first heat.
 

@@ -12,7 +12,7 @@ import numpy as np
 from sweep.errors import InputError, MissingInput
 from sweep.families.base import Array
 from sweep.optimise.multistart.multistart import listed
-from sweep.optimise.multistart.survey import Group
+from sweep.optimise.multistart.survey import StartGroup
 from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import best_rows, random_designs, swept_and_sampled
@@ -123,7 +123,7 @@ def _length_bounds(study: Study, name: str) -> tuple[float, float] | None:
 
 def problem_and_starts(
     study: Study, folder: Path, stop: Callable[[], bool] = lambda: False, jobs: int = 1
-) -> tuple[Problem, Iterator[Group]]:
+) -> tuple[Problem, Iterator[StartGroup]]:
     """Return the problem of a study and an iterator of its groups of starts, each made when requested.
 
     With ``optimise.global = "proportions"`` they are ends of populations, whose descents run in ``jobs`` threads;

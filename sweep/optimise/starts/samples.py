@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
-from sweep.optimise.multistart.survey import GROUP_SIZE, Group
+from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup
 from sweep.optimise.problem.program import violation_scale
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import compared
@@ -40,7 +40,7 @@ OUTSIDE, NOT_TURNING = 1e100, 1e200  # above every objective: violates its limit
 
 def samples(
     problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, stop: Callable[[], bool] = lambda: False
-) -> Iterator[Group]:
+) -> Iterator[StartGroup]:
     """Yield at most ``count`` good designs, sample by sample; the same arguments give the same designs.
 
     Parameters
@@ -58,7 +58,7 @@ def samples(
             return
         designs = sample(problem, signs, size, seed, k, stop)[: count - k * size]
         if len(designs):
-            yield Group(designs, k)
+            yield StartGroup(designs, k)
 
 
 def sample(

@@ -162,7 +162,7 @@ class NamedCandidates(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Task(ABC):
+class EngineeringTask(ABC):
     """Base of the tasks of the engineering method.
 
     Parameters

@@ -19,7 +19,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, named, turn, with_tops
-from sweep.synthesis.tasks.problem import NamedCandidates, Task, Unknown, turning
+from sweep.synthesis.tasks.problem import EngineeringTask, NamedCandidates, Unknown, turning
 
 RSSP = family("rssp")
 SIDEWAYS = {"along": (-4.0, 6.0), "across": (-4.0, 4.0)}
@@ -154,7 +154,7 @@ STAGES: Mapping[str, FourBar] = {one.family: one for one in (FourBar(), RockerSl
 
 
 @dataclass(frozen=True)
-class Task6(Task):
+class Task6(EngineeringTask):
     """The unknowns are shape and place of a second stage whose working point moves from J1 to J2 with given tangents.
 
     Size, direction and place of the stage follow from J1 and J2 (they are similarity transformations), so the unknowns
@@ -235,7 +235,7 @@ class Task6(Task):
 
 
 @dataclass(frozen=True)
-class Task7(Task):
+class Task7(EngineeringTask):
     """The unknowns are a2, b2, e2 and the angle of the second crank; stroke and both accelerations are the equations.
 
     At a limit of stage 1 its velocity vanishes, so the output's acceleration there is psi'' S', and S' = w/psi''.
