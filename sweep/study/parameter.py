@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Literal, TypeAlias
 
+from sweep.effects.loads import GRAM
 from sweep.families.base import Parameter
 from sweep.quantities import units
 from sweep.study.file import Count, Faults, Key, Number, Section, holds, read_section
@@ -43,7 +44,8 @@ class FixedEntry(Section):
 
 def missing_parameter(p: Parameter) -> str:
     """Describe a missing parameter: its meaning and the valid ways to write it."""
-    return f"{p.text}: {forms(p)}, or an axis {{ from = ..., to = ..., count = ...{_unit_form(p)} }}"
+    text = p.text.replace(GRAM, "")  # which is for tables without units
+    return f"{text}: {forms(p)}, or an axis {{ from = ..., to = ..., count = ...{_unit_form(p)} }}"
 
 
 def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:

@@ -201,6 +201,11 @@ def test_faults_of_bodies_and_loads_name_the_place_and_what_is_right(tmp_path, t
     assert line in faults(tmp_path, text, {"g.csv": "a,b\n0,x\n90,2\n"})
 
 
+def test_missing_mass_is_told_without_the_gram_of_tables_in_tonnes(tmp_path):
+    fault = str(faults(tmp_path, HEAD + "[bodies]\n" + BODIES.replace('m_crank2 = "10 g"\n', "")))
+    assert "mass of the crank" in fault and "a gram is" not in fault
+
+
 def test_an_input_given_twice_is_a_fault(tmp_path):
     assert "either here or in [design]" in faults(tmp_path, HEAD + 'm_tool2 = "2 g"\n[bodies]\n' + BODIES)
 
