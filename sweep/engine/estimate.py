@@ -61,7 +61,6 @@ class Estimate:
     memory_bytes: float
     disk_bytes: float
     seconds: float
-    optimise_seconds: float | None
 
 
 def estimate(
@@ -82,10 +81,9 @@ def estimate(
     Returns
     -------
     Estimate
-        ``seconds`` of the sweep alone, without the first compilation of the kernels; ``optimise_seconds`` is the time
-        the optimiser may take, None without optimiser or budget.  If the pilot keeps no design, one in a thousand is
-        assumed.  ``disk_bytes`` assumes that every result of a row is computed and does not repeat, which is too much
-        where rows of infeasible designs are kept or symmetries make values repeat.
+        ``seconds`` of the sweep alone, without the first compilation of the kernels.  If the pilot keeps no design, one
+        in a thousand is assumed.  ``disk_bytes`` assumes that every result of a row is computed and does not repeat,
+        which is too much where rows of infeasible designs are kept or symmetries make values repeat.
     """
     sample = pilot(study, tell) if known is None else known
     chunk_size = choose_chunk_size(study, sample)
@@ -112,7 +110,6 @@ def estimate(
         disk_bytes=designs * share * (OTHER_BYTES_PER_ROW + sampled + results)
         + chunks * (len(columns) * BYTES_PER_COLUMN + BYTES_PER_CHUNK),
         seconds=work / (1.0 if jobs == 1 else jobs * THREAD_EFFICIENCY),
-        optimise_seconds=None if study.optimise is None else study.optimise.time_budget,
     )
 
 

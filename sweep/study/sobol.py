@@ -66,7 +66,7 @@ DIMENSIONS = len(_JOE_KUO)
 
 
 class Sobol:
-    """Sobol sequence of one seed; ``points(start, stop)`` has the shape (dimensions, stop - start), values in (0, 1).
+    """Sobol sequence of one seed, with values in (0, 1).
 
     ``seed`` chooses a random lower-triangular mixing of the digits and a random digital shift (Matousek's scrambling):
     every aligned block of 2^k points keeps its stratification.  None leaves the plain sequence, which starts at 0.
@@ -92,13 +92,6 @@ class Sobol:
         first_runs = np.ascontiguousarray(self._tables[:, 0, gray].reshape(dimensions, 2, RUN))
         self._digits = Digits(first_runs, self._tables, self._shift, self._centre)
 
-    def points(self, start: int, stop: int, which: Sequence[int] | None = None) -> Array:
-        """Return points start to stop - 1, one row per dimension, restricted to the dimensions ``which`` if given."""
-        dimensions = range(len(self._shift)) if which is None else which
-        out = np.empty((stop - start, len(dimensions)))
-        self.fill(start, stop, dimensions, [(0.0, 1.0)] * len(dimensions), range(len(dimensions)), out)
-        return out.T
-
     def fill(
         self, start: int, stop: int, which: Sequence[int], ends: Sequence[tuple[float, float]], columns: Sequence[int],
         out: Array,
@@ -112,7 +105,7 @@ class Sobol:
         sobol_points(start, stop, self._digits, dimensions, low, high, places, out)
 
     def at(self, index: NDArray[np.int64], which: Sequence[int] | None = None) -> Array:
-        """Return the points of the given indices, in any order, with the same bits as `points`."""
+        """Return the points of the given indices, in any order, one row per dimension, with the same bits as `fill`."""
         gray = index ^ (index >> 1)
         first, high = gray & (RUN - 1), gray >> TABLE_BITS
         dimensions = range(len(self._shift)) if which is None else which

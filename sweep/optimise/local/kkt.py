@@ -111,7 +111,6 @@ class Result:
     agree: int = 1
     basin: int = 0
     looks: int = 0
-    caveat: str = CAVEAT
 
     @property
     def feasible(self) -> bool:
