@@ -41,8 +41,8 @@ WIDTH = 56  # column of the explanations
 OFFSETS = 12  # angles tried between the crank of a later stage and the rocker before it, over the turn
 POSES = 72  # of each
 
-# Starts that turn with pressure angles below 45 degrees, where the example, which also serves as a hard input, does not
-# [mm; SI with masses or forces; rad].
+# Starts that turn with pressure angles below 45 degrees and room on either side, where the example, from which hard
+# inputs are derived, does not [mm; SI with masses or forces; rad].
 _DEG = math.pi / 180.0
 _FOUR_BAR = {"a": 10.0, "b": 26.0, "c": 34.0, "e": 40.0, "xi": 28.0, "eta": -24.0, "branch": 1.0}
 _RSSR = {"a": 10.0, "b": 36.0, "c": 26.0, "e": 40.0, "f": 6.0, "g": -4.0, "alpha": 40.0 * _DEG, "branch": -1.0}
@@ -67,6 +67,12 @@ STARTS: Mapping[str, Mapping[str, float]] = {
         "a1": 10.0, "b1": 39.0, "c1": 25.0, "e1": 44.0, "f1": 10.0, "g1": -6.0, "alpha1": 30.0 * _DEG,
         "a2": 2.0, "b2": 25.0, "e2": -1.0, "f2": -5.0, "alpha2": 23.0 * _DEG, "offset2": 40.0 * _DEG, "slides": 1.0,
         "p0x": 21.0, "p0y": -1.0, "p0z": 36.0,
+    },
+    "feed_triad": {
+        "h_a": 5.0, "h_b": 34.0, "h_c": 16.0, "h_e": 35.0, "rh": 12.0, "xE2": 20.0, "yE2": -24.0, "rE2": 1.5,
+        "dE2": 17.0 * _DEG, "xE3": 55.0, "yE3": -23.0, "rE3": 1.5, "dE3": 29.0 * _DEG, "f1x": -10.0, "f1y": -7.0,
+        "f2x": -8.0, "f2y": -9.0, "f3x": 12.0, "f3y": -4.0, "q1": 14.0, "q2": 26.0, "q3": 27.0, "x0": 34.5, "y0": 9.0,
+        "chi0": 0.0, "h_sigma": -1.0,
     },
     "feed_foot": {name: 1e-3 * x for name, x in _FEED.items()} | {
         "dh": -17.0 * _DEG, "dE": 46.0 * _DEG, "h_sigma": -1.0, "bar_branch": -1.0,

@@ -98,6 +98,14 @@ def test_first_study_begins_with_a_mechanism_that_turns_moves_and_transmits_well
     assert abs(found[size]) > (math.radians(20.0) if size == "swing" else 10.0)
 
 
+def test_first_study_of_a_feed_on_three_leads_has_room_on_either_side(tmp_path):
+    """Ten of its 25 designs jammed."""
+    study = load_study(written(tmp_path, "feed_triad"))
+    ends = [axis.values[[0, 0, -1, -1] if k else [0, -1, 0, -1]] for k, axis in enumerate(study.space.axes)]
+    table = dict(study.space.fixed) | {axis.name: end for axis, end in zip(study.space.axes, ends, strict=True)}
+    assert (sweep.summarise("feed_triad", table, ["stroke"], accuracy=1e-6)["status"] == 0).all()
+
+
 @pytest.mark.parametrize("family", ["foot", "feed_foot"])
 def test_first_study_of_a_presser_foot_is_of_its_size_and_asks_for_soft_impacts(family, tmp_path):
     study = load_study(written(tmp_path, family))
