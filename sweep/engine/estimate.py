@@ -126,8 +126,8 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     from sweep.optimise.local.start import search
     from sweep.optimise.multistart.survey import CONFIRMATIONS, GROUP_SIZE
     from sweep.optimise.starts.dataset import SAMPLES, random_designs, sample_seconds
-    from sweep.optimise.starts.global_starts import POPULATIONS, SWEPT
     from sweep.optimise.starts.posing import problem_of
+    from sweep.optimise.starts.proportions import POPULATIONS, SWEPT
 
     designs = known.kept if len(known.kept) else random_designs(study, 1, settings.seed)
     if not len(designs):

@@ -31,8 +31,8 @@ from sweep.optimise.multistart.multistart import explore, listed, with_neighbour
 from sweep.optimise.multistart.survey import CUT, Survey
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.global_starts import insensitive
 from sweep.optimise.starts.posing import problem_and_starts, problem_of, problem_of_dataset
+from sweep.optimise.starts.proportions import insensitive
 
 if TYPE_CHECKING:
     from sweep.study import Study

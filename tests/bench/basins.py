@@ -13,10 +13,10 @@ from studies.accuracy.machine import description
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.local.start import search
 from sweep.optimise.starts.dataset import kinds, random_designs
-from sweep.optimise.starts.global_starts import enclosing
 from sweep.optimise.starts.linear import elimination
-from sweep.optimise.starts.populations import breed
+from sweep.optimise.starts.populations import population
 from sweep.optimise.starts.posing import problem_of
+from sweep.optimise.starts.proportions import Proportions, enclosing
 from sweep.study import Study
 from tests.support.needle208_record import FOLDER, record
 from tests.support.starts import populations_ended_at
@@ -30,8 +30,8 @@ WORDS = {"record": "links of any length", "record_8mm": "links of stage 2 of at 
 class Row:
     """One population of a seed: the value its best end leads to [mm/rad^2], nan where that is not feasible.
 
-    ``worth`` is what the poses made of that end, ``looks`` and ``cpu`` [s] are those of the population, ``searched``
-    [s] is the processor time of the local search.
+    ``worth`` is what the poses made of that end, ``cpu`` [s] is the processor time of the population,
+    ``searched`` [s] that of the local search.
     """
 
     problem: str
@@ -40,7 +40,6 @@ class Row:
     value: float
     residual: float
     worth: float
-    looks: int
     cpu: float
     searched: float
 
@@ -87,18 +86,18 @@ def populations(problem: str, seed: int, rows: Sequence[Row]) -> Iterator[Row]:
     own = problem_of(study, known)
     linear = elimination(own)
     assert linear is not None
-    signs = kinds(study, own, known[:0])
+    landscape = Proportions(linear, kinds(study, own, known[:0]))
     found = list(rows)
     while not told(study, found):
         times = [time.process_time()]
-        bred = breed(linear, signs, (seed, len(found)))
+        bred = population(landscape, (seed, len(found)))
         times.append(time.process_time())
         end = search(0, enclosing(study, own, bred.designs[:1]), bred.designs[0], lambda: False, study.optimise.looks)
         times.append(time.process_time())
         found.append(
             Row(
                 problem, seed, len(found), end.objective if end.feasible else float("nan"), end.kkt_residual,
-                float(bred.merit[0]), bred.evaluations, times[1] - times[0], times[2] - times[1],
+                float(bred.merit[0]), times[1] - times[0], times[2] - times[1],
             )
         )  # fmt: skip
         yield found[-1]

@@ -22,7 +22,7 @@ from sweep.families.base import Accuracy
 from sweep.optimise import Problem, on_locus, optimum
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.kkt import AGREE, Result
-from sweep.optimise.starts.samples import BLOCK, ranking
+from sweep.optimise.starts.ranked import BLOCK, ranking
 from sweep.study import Limit, OptimiseSettings
 from tests.bench.differential import differential
 

@@ -15,7 +15,7 @@ BEST = best_known("record_8mm")
 
 
 def row(number: int, value: float, seed: int = 1) -> Row:
-    return Row("record_8mm", seed, number, value, 1e-12, value, 11000, 10.0, 1.0)
+    return Row("record_8mm", seed, number, value, 1e-12, value, 10.0, 1.0)
 
 
 def test_seed_ends_by_the_rule_of_the_study_which_knows_no_optimum() -> None:

@@ -17,7 +17,8 @@ from pathlib import Path
 import numpy as np
 from sweep.families import family
 from sweep.optimise import Problem, optimum
-from sweep.optimise.starts import populations
+from sweep.optimise.starts.populations import population
+from sweep.optimise.starts.proportions import Proportions, PopulationSize
 from sweep.optimise.starts.linear import elimination
 from sweep.optimise.starts.dataset import random_designs
 from sweep.optimise.starts.posing import problem_of
@@ -31,10 +32,10 @@ for r in optimum(problem, [{}], OptimiseSettings(starts=3, seed=5)):
     print(r.ended, repr(r.objective), r.design.tobytes().hex(), r.looks, r.kkt_residual.hex(), r.active)
 study = load_study(Path("studies/needle208"))
 signs = [{"branch1": 1.0, "branch2": 1.0, "kappa2": 1.0}]
-size = populations.Size(sampled=1 << 13, first=6, later=4, generations=1)
+size = PopulationSize(sampled=1 << 13, first=6, later=4, generations=1)
 for tolerance in (None, study.tolerance):
     linear = elimination(problem_of(study, random_designs(study, 1, 208)), tolerance)
-    print(populations.breed(linear, signs, (7, 0), size=size).designs.tobytes().hex())
+    print(population(Proportions(linear, signs, size=size), (7, 0)).designs.tobytes().hex())
 """
 # What numpy and OpenBLAS would choose on other processors: sums in another order, so other last bits on the way.
 OTHERS = [

@@ -16,7 +16,7 @@ from sweep.optimise import Problem, minimise
 from sweep.optimise.local import newton
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
-from sweep.optimise.starts.samples import diverse
+from sweep.optimise.starts.populations import diverse
 from sweep.study import Limit, OptimiseSettings
 from tests.support.starts import from_sample
 

@@ -19,7 +19,7 @@ from sweep.families.base import Accuracy
 from sweep.optimise import Problem, minimise, on_locus, optimise_study, optimum
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
-from sweep.optimise.starts.samples import ranking
+from sweep.optimise.starts.ranked import ranking
 from sweep.study import Limit, OptimiseSettings, load_study
 from tests.support.specifications import specifications
 from tests.support.starts import from_sample

@@ -22,13 +22,13 @@ from sweep.optimise.local.kkt import Result
 from sweep.optimise.manufacture.curve_margins import curve_derivatives
 from sweep.optimise.multistart import parallel
 from sweep.optimise.multistart.multistart import explore
-from sweep.optimise.starts import global_starts, populations
+from sweep.optimise.starts import populations, proportions
 from sweep.optimise.starts.dataset import kinds, random_designs
-from sweep.optimise.starts.global_starts import from_populations
 from sweep.optimise.starts.linear import POSES, TURN, Elimination, elimination
-from sweep.optimise.starts.populations import Population, PopulationSize
+from sweep.optimise.starts.populations import Members
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.posing import problem_of
+from sweep.optimise.starts.proportions import PopulationSize, Proportions, from_populations
 from sweep.study import Study, study_from_data
 from tests.support.needle208_record import record
 
@@ -184,38 +184,44 @@ def test_places_that_do_not_turn_are_worth_nothing(rows: PoseRows) -> None:
     assert 5 < turns.sum() < 200 and np.isfinite(worth[turns]).all() and np.isinf(worth[~turns]).mean() > 0.95
 
 
-def end(worth: float, swing: float, place: np.ndarray, kind: int = 0) -> populations._End:
-    return populations._End(worth, kind, place, place, swing)
+def members(worth: list[float], places: np.ndarray) -> Members:
+    return Members(places, np.zeros(len(places), np.intp), np.array(worth), places)
 
 
-def test_every_class_of_swings_has_parents_however_good_the_others_are() -> None:
+def test_every_class_of_swings_has_parents_however_good_the_others_are(monkeypatch: pytest.MonkeyPatch) -> None:
     """Thirty good ends at large swings, two a little worse at small ones: these are parents too."""
-    rng = np.random.default_rng(5)
-    many = [end(10.6 + 0.01 * k, 0.95 + 0.01 * k, rng.random(4)) for k in range(30)]
-    few = [end(11.5, 0.55, rng.random(4)), end(11.6, 0.56, rng.random(4))]
-    guide = np.ones(4, np.bool_)
-    found = populations._parents(many + few, 12, guide)
-    swings = [x.swing for x in found]
-    assert sum(x < 0.6 for x in swings) == 2 and len(found) <= 5 * 3
+    landscape = Proportions(eliminated(), SIGNS)
+    monkeypatch.setattr(landscape, "_swings", lambda known: known.places[:, 0])
+    assert landscape.rows.driving[0]
+    places = np.random.default_rng(5).random((34, 11))
+    places[:30, 0], places[30:32, 0] = 0.95 + 0.01 * np.arange(30), (0.55, 0.56)
+    worth = [*(10.6 + 0.01 * np.arange(30)), 11.5, 11.6]
+    found = landscape.diverse(members(worth, places[:32]), 12)
+    assert (found.places[:, 0] < 0.6).sum() == 2 and len(found.merit) <= 5 * 3
     # Negative control: the twelve best are all of large swings.
-    assert all(x.swing > 0.9 for x in sorted(many + few, key=lambda e: e.merit)[:12])
+    assert (places[np.argsort(worth)[:12], 0] > 0.9).all()
     # No two are alike, useless ones and a third of the same class beside better ones are left out.
-    again = populations._parents([*many, end(10.6, 0.95, many[0].place), end(99.0, 0.55, rng.random(4))], 12, guide)
-    assert len({x.merit for x in again}) == len(again) and all(x.merit < 99.0 for x in again)
+    places[32], places[33, 0] = places[0], 0.55
+    again = landscape.diverse(members([*worth, 10.6, 99.0], places), 12).merit
+    assert len(set(again)) == len(again) and (again < 99.0).all()
 
 
 def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(6)
     record_place = rows.with_middle(place_of_record(rows), FIRST[:1])[0]
-    parents = [end(10.3, 0.83, record_place), end(10.9, 0.8, np.clip(record_place + 0.02 * rng.random(11), 0.0, 1.0))]
+    places = np.array([record_place, np.clip(record_place + 0.02 * rng.random(11), 0.0, 1.0)])
+    landscape = Proportions(eliminated(), SIGNS[:1], size=SMALL._replace(later=24))
     worth = {}
-    monkeypatch.setattr(populations, "DRIVERS", 1)
+    monkeypatch.setattr(proportions, "DRIVERS", 1)
     for tries in (1, 64):
-        monkeypatch.setattr(populations, "TRIES", tries)
-        monkeypatch.setattr(populations, "RANDOM_TRIES", 4 * tries)
-        places, kinds = populations._children(rows, parents, np.random.default_rng(7), 24, 1)
-        assert places.shape == (24, 11) and not kinds.any() and (places >= 0.0).all() and (places <= 1.0).all()
-        worth[tries] = populations._initial_merits(rows, places, kinds, 1)
+        monkeypatch.setattr(proportions, "TRIES", tries)
+        monkeypatch.setattr(proportions, "RANDOM_TRIES", 4 * tries)
+        tried = landscape._tries(members([10.3, 10.9], places), np.random.default_rng(7))
+        children = [populations.best_tries(landscape, of_kind, FIRST[: len(of_kind)]) for of_kind, _ in tried]
+        found = np.concatenate([child.places for child in children])
+        assert found.shape == (24, 11) and (found >= 0.0).all() and (found <= 1.0).all()
+        worth[tries] = np.concatenate([child.merit for child in children])
+        np.testing.assert_array_equal(landscape.values(found, FIRST[:24]), worth[tries])
     # Of one try most do not turn; of 64 nearly all children do, and their middle is far better.
     assert np.isfinite(worth[64]).mean() > 0.9 and np.median(worth[64]) < 0.5 * np.median(worth[1])
 
@@ -223,19 +229,18 @@ def test_children_are_the_best_of_many_tries(rows: PoseRows, monkeypatch: pytest
 SMALL = PopulationSize(sampled=1 << 13, first=12, later=6, generations=1, first_steps=4, steps=8)
 
 
-def same(one: Population, other: Population) -> None:
+def same(one: Members, other: Members) -> None:
     np.testing.assert_array_equal(one.designs, other.designs)
     np.testing.assert_array_equal(one.merit, other.merit)
-    assert one.evaluations == other.evaluations
 
 
 def test_populations_are_those_of_their_seed_and_number() -> None:
-    linear = eliminated(8.0)
-    first, second = populations.populations(linear, SIGNS, 2, 5, size=SMALL)
-    same(next(populations.populations(linear, SIGNS, 1, 5, size=SMALL)), first)
+    landscape = Proportions(eliminated(8.0), SIGNS, size=SMALL)
+    first, second = populations.populations(landscape, 2, 5)
+    same(next(populations.populations(landscape, 1, 5)), first)
     assert not np.array_equal(first.designs, second.designs)
     assert (np.diff(first.merit) > 0.0).all() and len(first.merit) >= 4
-    names = linear.problem.family.parameter_names
+    names = landscape.rows.family.parameter_names
     table = {name: first.designs[:, k] for k, name in enumerate(names)}
     found = sweep.summarise(["rssr", "guide"], table, ["max_abs_d2s", "max_abs_dev", "stroke"], accuracy=1e-6)
     good = first.merit < 13.0  # the better ones keep their limits, and are worth what they do
@@ -243,7 +248,9 @@ def test_populations_are_those_of_their_seed_and_number() -> None:
     np.testing.assert_allclose(found["max_abs_d2s"][good], first.merit[good], rtol=0.05)
     np.testing.assert_allclose(found["stroke"].abs()[good], 24.5, rtol=0.02)
     assert (first.designs[:, names.index("a2")][good] >= 8.0 * 0.98).all()
-    assert not list(populations.populations(linear, SIGNS, 2, 5, stop=lambda: True))
+    # A search that is stopped at once has one population, of what its first sample gives.
+    (stopped,) = populations.populations(landscape, 2, 5, lambda: True)
+    assert len(stopped.merit) > 0 and stopped.merit[0] > first.merit[0]
 
 
 def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -251,16 +258,16 @@ def test_populations_are_made_until_they_tell_enough(monkeypatch: pytest.MonkeyP
     values = [1.1, 1.0, 1.1, 1.0, math.inf, 1.1, 1.0, 0.9, 0.9]
     made = list[int]()
 
-    def numbered(linear: object, signs: object, seed: tuple[int, int], *rest: object) -> Population:
+    def numbered(landscape: object, seed: tuple[int, int], stop: object) -> Members:
         made.append(seed[1])
-        return Population(known, np.array([1.0 + seed[1]]), 0)
+        return Members(known, np.zeros(1, np.intp), np.array([1.0 + seed[1]]), known)
 
     def led(number: int, *rest: object) -> Result:
         value = values[made[-1]]
         status = st.OK if math.isfinite(value) else st.LIMIT_EXCEEDED
         return Result(number, known[0], value, 0.0, 0.0, 0.0, (), {}, {}, {}, status, "converged")
 
-    monkeypatch.setattr(populations, "breed", numbered)
+    monkeypatch.setattr(populations, "population", numbered)
     monkeypatch.setattr(parallel, "search", led)
     study = record(8.0, starts=4, populations=9, seed=3)
     known = random_designs(study, 1, 3)
@@ -283,11 +290,11 @@ def test_populations_in_threads_are_those_of_one_thread() -> None:
     tiny = SMALL._replace(sampled=1 << 11, first=4, generations=1, later=4, steps=5)
     for robust in (False, True):
         linear = eliminated(8.0, robust)
-        same(*(next(populations.populations(linear, SIGNS, 1, 5, jobs=jobs, size=tiny)) for jobs in (1, 3)))
+        same(*(populations.population(Proportions(linear, SIGNS, jobs, tiny), (5, 0)) for jobs in (1, 3)))
 
 
 def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(global_starts, "populations", partial(populations.populations, size=SMALL))
+    monkeypatch.setattr(proportions, "Proportions", partial(Proportions, size=SMALL))
     study = record(8.0, starts=6, populations=2, seed=3, looks=100)
     known = random_designs(study, 4, 3)
     problem = problem_of(study, known)
@@ -299,7 +306,8 @@ def test_starts_are_the_best_end_of_every_population_and_another(monkeypatch: py
     np.testing.assert_array_equal(better.designs, own.designs)
     linear = elimination(problem)
     assert linear is not None
-    found = list(populations.populations(linear, kinds(study, problem, known[:1]), 2, 3, size=SMALL))
+    landscape = Proportions(linear, kinds(study, problem, known[:1]), size=SMALL)
+    found = list(populations.populations(landscape, 2, 3))
     worth = {one.designs[k].tobytes(): one.merit[k] for one in found for k in range(len(one.merit))}
     for number, (group, one) in enumerate(zip(groups, found, strict=True)):
         assert (group.source, group.counted, len(group.designs)) == (number, 1, 2)

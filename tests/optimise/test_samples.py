@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,10 +13,11 @@ from sweep.engine.run import run
 from sweep.families import family
 from sweep.optimise import Problem, on_locus, optimum
 from sweep.optimise.multistart.survey import GROUP_SIZE
-from sweep.optimise.starts import samples as sampling
+from sweep.optimise.starts import ranked as sampling
 from sweep.optimise.starts.dataset import sample_seconds
+from sweep.optimise.starts.populations import Members, population
 from sweep.optimise.starts.posing import problem_and_starts
-from sweep.optimise.starts.samples import OUTSIDE, sample
+from sweep.optimise.starts.ranked import OUTSIDE, Ranked
 from sweep.study import Limit, OptimiseSettings, load_study
 from tests.support.starts import from_sample, gathered
 
@@ -106,7 +106,7 @@ def test_samples_have_points_of_their_own_and_do_not_depend_on_their_number() ->
     starts, numbers = gathered(sampling.samples(problem, BRANCHES, 12, 3))
     assert numbers == (0,) * 6 + (1,) * 6
     np.testing.assert_array_equal(starts[:6], from_sample(problem, BRANCHES, 6, 3))
-    np.testing.assert_array_equal(starts[6:], sample(problem, BRANCHES, 6, 3, 1))
+    np.testing.assert_array_equal(starts[6:], population(Ranked(problem, BRANCHES, 6), (3, 1)).designs)
     assert len(np.unique(starts, axis=0)) == 12
     assert gathered(sampling.samples(problem, BRANCHES, 7, 3))[1] == (0, 0, 0, 0, 1, 1, 1)
 
@@ -121,8 +121,8 @@ def test_sample_that_is_stopped_ranks_no_further_design(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(sampling, "ranking", counted)
     stops = iter([False, True, True])
-    found = sample(on_locus(CORNER), BRANCHES, 2, 3, 0, lambda: next(stops))
-    assert len(found) and len(ranked) <= 2 + len(BRANCHES)  # one block, then those of it that seem good
+    found = population(Ranked(on_locus(CORNER), BRANCHES, 2), (3, 0), lambda: next(stops))
+    assert len(found.designs) and len(ranked) <= 3  # two blocks, then those of them that seem good
 
 
 def test_price_of_a_sample_is_that_of_few_designs_where_they_are_dear(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,7 +130,7 @@ def test_price_of_a_sample_is_that_of_few_designs_where_they_are_dear(monkeypatc
     for step, number in ((0.1, 64), (0.001, 8192)):
         ticks = itertools.count(step=step)
         monkeypatch.setattr("sweep.optimise.starts.dataset.time.process_time", lambda ticks=ticks: next(ticks))
-        of_sample = (2**15 + 16 * 24 * 12) * GROUP_SIZE  # designs drawn, and those of the rounds about the best of them
+        of_sample = (2**15 + 16 * 24 * 12) * GROUP_SIZE  # designs drawn, and tries around the best of them
         assert sample_seconds(CORNER, base, GROUP_SIZE) == pytest.approx(step / number * of_sample)
 
 
@@ -156,17 +156,21 @@ def test_two_coordinates_in_five_of_half_a_sample_are_at_bounds_but_no_angle_of_
     assert ends[4] == 0.0 and drawn[:, 4].min() >= 0.25 and drawn[:, 4].max() <= 0.75
 
 
-def test_half_of_what_is_improved_misses_the_limits_and_stands_apart() -> None:
+def test_half_of_what_is_improved_misses_the_limits_and_stands_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(2)
-    place = rng.random((400, 2))
-    kind = np.zeros(400, np.intp)
-    merit = np.where(place[:, 0] < 0.5, 1.0 + place[:, 1], OUTSIDE * (2.0 + place[:, 1]))
-    chosen, near = sampling._parents(place, kind, merit, 16)
-    assert len(chosen) == len(set(chosen.tolist())) == 16 and near == 8
-    assert (place[chosen[:8], 0] < 0.5).all() and (place[chosen[8:], 0] >= 0.5).all()
-    gaps = np.linalg.norm(place[chosen[8:], None] - place[None, chosen], axis=2)
+    places = rng.random((400, 5))
+    kinds = np.zeros(400, np.intp)
+    merit = np.where(places[:, 0] < 0.5, 1.0 + places[:, 1], OUTSIDE * (2.0 + places[:, 1]))
+    landscape = Ranked(on_locus(CORNER), BRANCHES, 1)
+    monkeypatch.setattr(landscape, "values", lambda places, *_: 1.0 + places[:, 1])
+    monkeypatch.setattr(landscape, "children", lambda parents, *_: parents)
+    monkeypatch.setattr(landscape, "ends", 9)  # more than keep the limits: no member is left out afterwards
+
+    chosen = landscape.first(Members(places, kinds, merit, places[:, :0]), rng, lambda: False)
+    assert len(np.unique(chosen.places, axis=0)) == len(chosen.places) == 16
+    assert (chosen.places[:8, 0] < 0.5).all() and (chosen.places[8:, 0] >= 0.5).all()
+    gaps = np.linalg.norm(chosen.places[8:, None] - chosen.places[None], axis=2)
     assert gaps[gaps > 0.0].min() > 0.05
     # Where nothing misses the limits, all of them keep these.
-    chosen, near = sampling._parents(place, kind, 1.0 + place[:, 1], 16)
-    assert len(chosen) == 16 and near == 8
-    assert math.isfinite(merit[chosen].max())
+    chosen = landscape.first(Members(places, kinds, 1.0 + places[:, 1], places[:, :0]), rng, lambda: False)
+    assert len(chosen.merit) == 16 and (chosen.merit < OUTSIDE).all()

@@ -11,7 +11,7 @@ import numpy as np
 from kernels import status as st
 from sweep.optimise import Problem, Result, Survey
 from sweep.optimise.multistart.survey import StartGroup, survey
-from sweep.optimise.starts.samples import samples
+from sweep.optimise.starts.ranked import samples
 from sweep.study import OptimiseSettings
 from tests.support.optimise_family import FAMILY
 

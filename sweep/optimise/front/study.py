@@ -21,8 +21,8 @@ from sweep.families.names import by_magnitude
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.front.pareto import FrontSearch, advance
 from sweep.optimise.multistart.kept import noted, result_of
+from sweep.optimise.starts.populations import diverse
 from sweep.optimise.starts.posing import problem_of_dataset
-from sweep.optimise.starts.samples import diverse
 from sweep.optimise.study import certificates, outputs, write
 from sweep.quantities.units import internal_unit
 

@@ -34,7 +34,7 @@ from sweep.optimise.multistart.survey import (
 from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import PLACE, Problem
-from sweep.optimise.starts.samples import samples
+from sweep.optimise.starts.ranked import samples
 
 if TYPE_CHECKING:
     from sweep.study import OptimiseSettings, Study

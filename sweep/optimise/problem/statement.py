@@ -129,7 +129,7 @@ class Problem:
 
         Parameters
         ----------
-        base : (P,) one design
+        base : (P,) one design, or (k, P)
         fractions : (n,) or (k, n); complex ones give complex designs
 
         Returns
@@ -160,7 +160,7 @@ class Problem:
         return self._filled(base, values)
 
     def _filled(self, base: Array, values: Array) -> Array:
-        designs = np.empty((len(values), len(base)), values.dtype)
+        designs = np.empty((len(values), base.shape[-1]), values.dtype)
         designs[:] = base
         indices, columns = self._direct
         designs[:, columns] = values[:, indices]

@@ -17,7 +17,8 @@ from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
 from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup, in_groups
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.samples import ALIKE, RANKED, diverse, ranking, samples
+from sweep.optimise.starts.populations import diverse
+from sweep.optimise.starts.ranked import ALIKE, RANKED, ranking, samples
 from sweep.quantities.limits import compared
 from sweep.synthesis.fit import fit_line
 from sweep.synthesis.tasks import solve

@@ -198,10 +198,10 @@ class PoseRows:
         return out
 
     def wrapped(self, places: Array) -> Array:
-        """Return places (k, n) between 0 and 1: an angle with a whole turn is wrapped, other variables are clipped."""
+        """Return places (..., n) between 0 and 1: an angle of a whole turn is wrapped, other variables are clipped."""
         out = np.clip(places, 0.0, 1.0)
         if self.offset >= 0 and self.high[self.offset] - self.low[self.offset] >= 2.0 * math.pi - 1e-9:
-            out[:, self.offset] = places[:, self.offset] % 1.0
+            out[..., self.offset] = places[..., self.offset] % 1.0
         return out
 
     def with_middle(self, places: Array, kinds: Index) -> Array:
@@ -224,7 +224,7 @@ class PoseRows:
 
 
 class Descents:
-    """Descents from many places; ``merit`` (k,) are their present values, ``evaluations`` count those with gradients.
+    """Descents from many places; ``merit`` (k,) are their present values.
 
     Parameters
     ----------
@@ -242,21 +242,14 @@ class Descents:
         self.curvature = np.empty((k, n + UNKNOWNS, n + UNKNOWNS))
         for matrix in self.curvature:
             reset_curvature(matrix)
-        self.abandoned = 0.0
 
     @property
     def merit(self) -> Array:
         """Present value of each descent."""
         return self.states[:, 0]
 
-    @property
-    def evaluations(self) -> int:
-        """Number of evaluations with gradients, including those of abandoned descents."""
-        return int(self.abandoned + self.states[:, 3].sum())
-
     def keep(self, numbers: NDArray[np.intp]) -> None:
         """Continue only the descents with these numbers."""
-        self.abandoned += float(self.states[:, 3].sum() - self.states[numbers, 3].sum())
         for name in ("places", "kinds", "x", "states", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])
 

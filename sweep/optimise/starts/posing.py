@@ -16,7 +16,7 @@ from sweep.optimise.multistart.survey import StartGroup
 from sweep.optimise.problem.on_locus import LocusCoordinates
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import best_rows, random_designs, swept_and_sampled
-from sweep.optimise.starts.global_starts import descend_once, enclosing, from_populations
+from sweep.optimise.starts.proportions import descend_once, enclosing, from_populations
 from sweep.quantities.limits import Limit, tightest
 
 if TYPE_CHECKING:
