@@ -7,7 +7,7 @@ from pathlib import Path
 
 from sweep.exchange.scene import is_spatial, over, projection
 from sweep.families import NAMES, family
-from sweep.plot.drawing import draw_frame, spread
+from sweep.plot.drawing import draw_frame, separate_names
 from sweep.report.figures import house_style, new_figure, save
 
 FOLDER = Path(__file__).parent / "figures"
@@ -28,7 +28,7 @@ def main() -> None:
             axes.set_axis_off()
             if axes.get_legend_handles_labels()[0]:
                 axes.legend(loc="best", fontsize="small")
-            spread(figure)
+            separate_names(figure)
             save(figure, FOLDER / f"frame-{name}.svg")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +32,10 @@ def test_page_of_every_family_has_its_picture_and_all_joints(name):
     (part,) = over(name, dict(family(name).example), 0.0, 12)
     named = {word for row in re.findall(r"^\| ([^|]+) \|", rows, flags=re.MULTILINE) for word in row.split(", ")}
     assert {j.upper() if len(j) < 3 else j for j in part.joints} == named
+
+
+def test_program_that_draws_the_pictures_finds_all_that_it_imports():
+    assert callable(runpy.run_path(str(DOCS / "frames.py"))["main"])
 
 
 def test_pages_of_families_show_their_pictures_and_no_figure_is_large():
