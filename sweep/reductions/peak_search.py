@@ -15,19 +15,10 @@ from sweep.numerics.records import joined, only, put
 from sweep.numerics.singularities import Singularities
 from sweep.numerics.ties import first_of_equals
 from sweep.quantities.kinds import Request
-from sweep.reductions import refine
+from sweep.reductions import refine, rounding
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
 from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
-from sweep.reductions.rounding import (
-    measure_constants,
-    order_of,
-    rounding_alone,
-    rounding_share,
-    shaken,
-    singular_share,
-    tells,
-)
 from sweep.reductions.sampling import (
     DESIGN_STATUS,
     Extremum,
@@ -162,10 +153,10 @@ class Search:
             row, column = row[:count], column[:count]
             if request.mode != 0 or self.locate or request.place:
                 heights = np.abs(values) if request.mode == 0 else values
-                alone[number] = measure_constants(heights, scale, rough)
+                alone[number] = rounding.measure_constants(heights, scale, rough)
             if samples >= BREAKING:
                 given = self.family.precise(), self.designs[rows], request.pose
-                alone[number] |= rounding_alone(*given, values, scale, rough > ROUGH)
+                alone[number] |= rounding.rounding_alone(*given, values, scale, rough > ROUGH)
                 rough[alone[number]] = 0.0
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
                 torn = jumps(values, scale, ROUGH)
@@ -181,7 +172,7 @@ class Search:
         for name in self.guards:
             one, largest = np.empty(count), columns[name].max(axis=1)
             scan.nearest_singularity(columns[name], one)
-            distance = np.where(tells(largest), np.minimum(distance, one), distance)
+            distance = np.where(rounding.tells(largest), np.minimum(distance, one), distance)
         # Coarse samples show a near zero only roughly: at most eight times as many samples at once.
         wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
         samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
@@ -217,7 +208,7 @@ class Search:
         share = self._rounding(turn, candidates, self.guards)
         if self.near is not None:
             near = self.near.only(turn.rows[candidates.row])
-            share += singular_share(near, peaks.phi, self._orders(candidates))
+            share += rounding.singular_share(near, peaks.phi, self._orders(candidates))
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is None:
             # A quartic may fall below zero where a curve touches zero; a value at a pose is attained.
@@ -249,8 +240,8 @@ class Search:
         peak.err_phi[bare] = np.maximum(peak.step, refine.SHRINK**3 * peak.spacing)[bare]
         peak = refine.confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
         # The first stage of a chain gets its exact input angle, later stages a rounded one.
-        rounding = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
-        put(peaks, rivals, peak._replace(err_height=peak.err_height + rounding))
+        blurred = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
+        put(peaks, rivals, peak._replace(err_height=peak.err_height + blurred))
 
     def _rivals(
         self, turn: Sampled, candidates: PeakCandidates, peaks: Peaks, size: Array
@@ -296,12 +287,12 @@ class Search:
     def _rounding(self, turn: Sampled, candidates: PeakCandidates, guards: list[str]) -> Array:
         """Share of a value by which rounding may have changed it and its neighbours alike."""
         given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
-        return rounding_share(self.family, *given, guards, self._orders(candidates))
+        return rounding.rounding_share(self.family, *given, guards, self._orders(candidates))
 
     def _orders(self, candidates: PeakCandidates) -> Index:
         """Order of derivative of each candidate; a discriminant rounds like a position."""
-        orders = np.array([0 if self.anywhere else order_of(self.family, request.pose) for request in self.requests])
-        found: Index = orders[candidates.request]
+        orders = [0 if self.anywhere else rounding.order_of(self.family, r.pose) for r in self.requests]
+        found: Index = np.array(orders)[candidates.request]
         return found
 
     def _within_window(
@@ -331,7 +322,7 @@ class Search:
         err = np.maximum(peaks.err_height[chosen], ceiling[has] - peaks.height[chosen])
         located, rounded, off = self.locate or request.place, self.family.precise_poses is None, np.zeros(rows.size)
         if (located or rounded) and chosen.size:
-            off[has] = shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
+            off[has] = rounding.shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
         if rounded and chosen.size:
             # Badly scaled designs lose digits before any discriminant is computed.
             err = np.maximum(err, off[has])

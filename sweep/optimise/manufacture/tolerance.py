@@ -200,15 +200,9 @@ def _deviates(dimensions: int, seed: int, samples: int) -> Array:
 
 
 def tolerance_rows(
-    family: Family,
-    design: Array,
-    outputs: Sequence[str],
-    limits: Sequence[Limit],
-    tolerance: Tolerance,
-    seed: int,
-    accuracy: Accuracy,
-    window: tuple[float, float] | None = None,
-) -> dict[str, list[Any]]:
+    family: Family, design: Array, outputs: Sequence[str], limits: Sequence[Limit], tolerance: Tolerance, seed: int,
+    accuracy: Accuracy, window: tuple[float, float] | None = None,
+) -> dict[str, list[Any]]:  # fmt: skip
     """Return the distribution of design outputs under manufacturing tolerances, from 2048 designs around the given one.
 
     A tolerance with fewer samples gives fewer designs.
