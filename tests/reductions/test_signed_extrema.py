@@ -94,8 +94,10 @@ def test_a_largest_and_a_least_value_share_samples_and_keep_their_bits(of, pose,
     """Among the designs are those that do not turn, that need more samples, and that precise poses confirm."""
     designs = random_designs(2000, 7) if of is RSSR else needle_drives(3000, 7)
     both = (Request(pose, 1, place=place), Request(pose, -1, place=place))
-    together = fused.curve_of(of, both[0], False).extrema(both, designs, 1e-10)
-    for request, (found, status, undecided) in zip(both, together, strict=True):
+    curves = fused.together(fused.curve_of(of, both[0], False), both)
+    assert {curve.request for curve in curves} == set(both)
+    found_together = fused.extrema(curves, designs, 1e-10)
+    for request, (found, status, undecided) in zip([c.request for c in curves], found_together, strict=True):
         alone, status_alone, undecided_alone = fused.curve_of(of, request, False).extremum(designs, 1e-10)
         assert {st.OK, st.NOT_ROTATABLE} <= set(status) and np.isfinite(found.value).sum() > 100
         np.testing.assert_array_equal(status, status_alone)
