@@ -232,7 +232,8 @@ def read_table(path: Path) -> pd.DataFrame:
 
     try:
         with store_errors(path):
-            return pd.read_parquet(path, page_checksum_verification=True)
+            # Threads of pyarrow may still hold the file when a program ends, and abort it (apache/arrow 34314, 50482).
+            return pd.read_parquet(path, page_checksum_verification=True, use_threads=False)
     except (pa.ArrowException, StoreError, KeyError, ValueError, TypeError) as error:
         text = f"{path}: cannot be read ({str(error).splitlines()[0]}); delete it and run the study again"
         raise StoreError(text) from error

@@ -96,10 +96,8 @@ def _statement(study: Study, folder: Path) -> tuple[ProveSettings, Question, flo
 
 def _best(path: Path, question: Question) -> float:
     """Return the objective of the study's optimum; nan if no feasible design was found."""
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(path, columns=["role", "status", question.objective]).to_pylist()
-    first = next(row for row in table if row["role"] == "optimum")
+    table = files.read_table(path)
+    first = table[table["role"] == "optimum"].iloc[0]
     return float(first[question.objective]) if first["status"] != st.LIMIT_EXCEEDED else float("nan")
 
 

@@ -134,13 +134,11 @@ def _nearest(data: Dataset) -> list[str]:
 
 def _cannot_meet(data: Dataset) -> list[str]:
     """Name the links that meet at no crank angle, for the design that comes nearest; empty if all links meet."""
-    import pyarrow.parquet as pq
-
     family, loops = data.study.family, data.study.family.every(Assembly)
     if not loops or isinstance(family.domain, Interval):
         return []
-    table = pq.read_table(files.beside(data.folder) / files.OPTIMUM, filters=[("role", "!=", "reference")])
-    designs = np.column_stack([table[name].to_numpy() for name in family.parameter_names]).astype(np.float64)
+    table = files.read_table(files.beside(data.folder) / files.OPTIMUM)
+    designs = table.loc[table["role"] != "reference", [*family.parameter_names]].to_numpy(np.float64)
     with np.errstate(all="ignore"):
         poses = family.poses(
             designs, Angles.of(np.asarray(TURN[None, :], np.float64)), frozenset(loop.discriminant for loop in loops)

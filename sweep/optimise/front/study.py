@@ -185,5 +185,5 @@ def best_within(
 def _columns(path: Path, names: list[str]) -> dict[str, Any]:
     import pyarrow.parquet as pq
 
-    table = pq.read_table(path, columns=list(dict.fromkeys(names)))
+    table = pq.read_table(path, columns=list(dict.fromkeys(names)), use_threads=False)
     return {name: table[name].to_numpy() for name in table.column_names}
