@@ -18,7 +18,7 @@ from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import RESOLVED, at_poses, on_finer_grids, per_turn, reduction_outputs
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.poses import optional_outputs
-from sweep.numerics.steady_speed import forwards
+from sweep.numerics.even_grids import forwards
 
 EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
 FORMULAS = (

@@ -22,7 +22,7 @@ from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_out
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.curve_features import Switches
-from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, PER_LEFT, steady
+from sweep.numerics.even_grids import FINER, GRIDS, LEFT, PER_LEFT, steady
 
 EQUATION = "D4 (1)-(4)"
 FORMULAS = (

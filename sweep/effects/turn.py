@@ -15,7 +15,7 @@ from sweep.effects.scene import Rows, Scene, take_over
 from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.poses import chosen
 from sweep.families.reduction import REDUCTIONS
-from sweep.numerics.grids import on_first_grid
+from sweep.numerics.even_grids import on_first_grid
 
 RESOLVED = 1e-9
 NONE: Mapping[str, Array] = MappingProxyType({})

@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any
 from sweep.errors import InputError, LinksweepError, extra
 from sweep.exchange.export import FORMATS, export
 from sweep.explore.cells import cells, design_of
-from sweep.explore.drag import dragged
+from sweep.explore.changes import dragged, improve, problem_in_hand
 from sweep.explore.hand import Hand
-from sweep.explore.improve import improve, problem_in_hand
 from sweep.pages import rendered
 from sweep.report.live import PLANE, SPATIAL
 

@@ -5,33 +5,24 @@ The kernels of the proof are imported by a proof alone, because other evaluation
 
 from __future__ import annotations
 
-from functools import cache, partial
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 from kernels.types import Numbers
 from sweep.families.capabilities import ProvableLocus
 
-if TYPE_CHECKING:
-    from kernels.families.rssr.box_turn import Formulas
-
 
 def _explored(
-    coordinates: str, question: tuple[Any, ...], search: tuple[Any, ...], leaves: tuple[Numbers, ...]
+    by_rocker: bool, question: tuple[Any, ...], search: tuple[Any, ...], leaves: tuple[Numbers, ...]
 ) -> tuple[int, int]:
     """Return the numbers of leaves filled and boxes judged by :func:`kernels.families.rssr.proof.explore`."""
-    from kernels.families.rssr import proof
+    from kernels.families.rssr import box_locus, proof
     from kernels.families.rssr.box_problem import BoxQuestion
 
-    whole: Any = (BoxQuestion(*question), _recorded(coordinates), *search, proof.Leaves(*leaves))
+    formulas = box_locus.by_rocker() if by_rocker else box_locus.by_axes()
+    whole: Any = (BoxQuestion(*question), formulas, *search, proof.Leaves(*leaves))
     found = proof.explore(*whole)
     return int(found[0]), int(found[1])
-
-
-@cache
-def _recorded(coordinates: str) -> Formulas:
-    formulas: Formulas = import_module(f"kernels.families.rssr.box_{coordinates}").recorded()
-    return formulas
 
 
 def _tests(lengths: tuple[str, ...]) -> tuple[str, ...]:
@@ -54,7 +45,7 @@ CRANK_ROCKER_BY_AXES = ProvableLocus(
     links=("a", "c", "b"),
     objectives=OBJECTIVES,
     rows=_tests(("a", "c", "b")),
-    explore=partial(_explored, "by_axes"),
+    explore=partial(_explored, False),
 )
 
 CRANK_ROCKER_BY_ROCKER = ProvableLocus(
@@ -62,5 +53,5 @@ CRANK_ROCKER_BY_ROCKER = ProvableLocus(
     links=("a", "e", "g", "b"),
     objectives=OBJECTIVES,
     rows=_tests(("a", "e", "g", "b")),
-    explore=partial(_explored, "by_rocker"),
+    explore=partial(_explored, True),
 )

@@ -11,9 +11,9 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, Switches, about, switches
+from sweep.numerics.panel_search import first_of_equals
 from sweep.numerics.records import joined, only, put
 from sweep.numerics.singularities import Singularities
-from sweep.numerics.ties import first_of_equals
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine, rounding
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of

@@ -1,7 +1,7 @@
 """Formulas over boxes of designs, for the comparison of enclosures in ``tests/bench/enclosures.py``.
 
-The formulas are those of the proofs (docs/proof.md): the tape of ``kernels/families/rssr/box_by_axes.py`` or
-``box_by_rocker.py``.  Each arithmetic runs the same operations on the same boxes.
+The formulas are those of the proofs (docs/proof.md): the tape of ``kernels/families/rssr/box_locus.py``.  Each
+arithmetic runs the same operations on the same boxes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kernels.boxes.tape import run
 from kernels.boxes.taylor import ROUNDING, least, variable, width
-from kernels.families.rssr import box_by_axes, box_by_rocker
+from kernels.families.rssr import box_locus
 from kernels.families.rssr import box_turn as bt
 from kernels.jit import kernel
 from sweep.proof.question import Question
@@ -80,7 +80,7 @@ def joined(first: Boxes, second: Boxes) -> Boxes:
 
 def formula_of(question: Question) -> tuple[Formula, Any]:
     """Everything from the coordinates to psi'' and F at one crank angle, and the recorded tape."""
-    recorded = (box_by_rocker if "psi_ext" in question.provable.coordinates else box_by_axes).recorded()
+    recorded = box_locus.by_rocker() if "psi_ext" in question.provable.coordinates else box_locus.by_axes()
     parts = (bt.PLACE, bt.ARRIVAL, bt.LENGTHS, bt.CLOSURE, bt.MOTION)
     rows = np.concatenate([np.arange(recorded.ends[p], recorded.ends[p + 1]) for p in parts])
     wanted = recorded.slots[list(WANTED.values())]

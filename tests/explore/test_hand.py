@@ -15,7 +15,7 @@ from sweep.cli.explore import in_hand
 from sweep.errors import InputError
 from sweep.evaluation.joints import parts
 from sweep.explore.cells import cells
-from sweep.explore.drag import dragged
+from sweep.explore.changes import dragged
 from sweep.explore.hand import of_study
 from sweep.explore.server import Server, page_text
 from sweep.study import study_from_data

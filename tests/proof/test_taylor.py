@@ -12,7 +12,7 @@ from hypothesis import strategies as hs
 import sweep
 from kernels.boxes.tape import Tape, run
 from kernels.boxes.taylor import VALUE, constant, least, multiply, variable, width
-from kernels.families.rssr import box_by_axes, box_by_rocker
+from kernels.families.rssr import box_locus
 from kernels.families.rssr import box_turn as bt
 from sweep.synthesis.locus import locus_designs
 
@@ -111,7 +111,7 @@ def test_lowest_point_inside_the_box_bounds_a_parabola():
 @pytest.mark.parametrize("size", [1e-5, 1e-3, 2e-2])
 @pytest.mark.parametrize("by_rocker", [False, True])
 def test_lengths_and_motion_of_every_design_lie_in_the_enclosures_of_its_box(by_rocker, size):
-    formulas = (box_by_rocker if by_rocker else box_by_axes).recorded()
+    formulas = box_locus.by_rocker() if by_rocker else box_locus.by_axes()
     rng = np.random.default_rng(3)
     checked = 0
     for _ in range(150):

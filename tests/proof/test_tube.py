@@ -12,7 +12,7 @@ import sweep
 from kernels.boxes.tape import run
 from kernels.boxes.taylor import width
 from kernels.boxes.tube import HIGH, LOW, POSES, THETA, least_acceleration, tube
-from kernels.families.rssr import box_by_rocker
+from kernels.families.rssr import box_locus
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_problem import BoxQuestion, angle_inputs, inputs, middle
 from sweep.proof.question import question_of
@@ -74,7 +74,7 @@ def test_tube_closes_at_the_least_acceleration_of_any_motion():
 
 @pytest.mark.parametrize("swing", [SWING, -SWING])
 def test_sign_of_the_row_tells_whether_the_rocker_has_passed_an_angle(swing):
-    formulas = box_by_rocker.recorded()
+    formulas = box_locus.by_rocker()
     recorded = (formulas.operations, formulas.factors, formulas.ends)
     branch = -1.0 if swing > 0.0 else 1.0
     problem = BoxQuestion(branch, 2, 0.5, np.full(8, np.inf), 1.0, np.zeros((0, 9)))

@@ -7,7 +7,7 @@ import pytest
 
 import sweep
 from kernels import status as st
-from sweep.numerics.ties import hill
+from sweep.numerics.panel_search import hill
 
 # A slider-crank a thousand times as long as its offsets: the force on the slider has three valleys, two of them a
 # millionth as high as its largest value, the lower one with sides so steep that little is known of its bottom.

@@ -83,7 +83,7 @@ def explore(
 
     Parameters
     ----------
-    p, f : the question, and the formulas of the locus (``recorded()`` of ``box_by_axes`` or ``box_by_rocker``)
+    p, f : the question, and the formulas of the locus of ``box_locus``
     starts : low and high ends of the boxes, (m, n) with n <= 4, and the bounds (m,) known of them; 0 for nothing
     whole : (n,) width of the whole space, by which widths are compared
     varied, given : (n,) which of the seven coordinates vary, and all seven

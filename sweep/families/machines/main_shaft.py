@@ -20,8 +20,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Output, Parameter, St
 from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.machines.relations import Relation
 from sweep.families.poses import chosen
-from sweep.numerics.grids import on_first_grid
-from sweep.numerics.steady_speed import FINER, GRIDS, LEFT, steady
+from sweep.numerics.even_grids import FINER, GRIDS, LEFT, on_first_grid, steady
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine

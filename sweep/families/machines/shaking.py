@@ -21,7 +21,7 @@ from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import Relation, with_size
 from sweep.families.machines.segments import cross
 from sweep.families.sites import AXES
-from sweep.numerics.grids import on_first_grid
+from sweep.numerics.even_grids import on_first_grid
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine

@@ -1,23 +1,28 @@
-"""Dragging a joint of a planar mechanism: dimensions and crank angle change while the other joints stay."""
+"""Changes of the design in hand: a joint of a planar mechanism is dragged, or one local search improves the design."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from sweep.errors import InputError
+from sweep.errors import InputError, MissingInput
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import is_spatial, shown_name
-from sweep.explore.hand import Hand
+from sweep.explore.hand import STEADY, Hand
 from sweep.families.base import Array, Turn
+from sweep.optimise.local.start import search
+from sweep.optimise.problem.statement import Problem
+from sweep.quantities.limits import Limit, tightest
 
 STEP = 1e-6  # step of differences: a share of the mechanism's size, or rad
 ROUNDS = 8
 LEAST = 1e-3  # share of its length that a positive dimension keeps
 STAY = 0.05  # weight of the joints that should stay, relative to the dragged one
 LITTLE = 1e-4  # weight of a change of a dimension by the mechanism's size
+LOOKS = 20_000  # evaluations of designs, as for one start of a study
 
 
 def dragged(
@@ -81,3 +86,43 @@ def dragged(
 
 def _flat(stages: Sequence[Part]) -> Array:
     return np.array([path[0, :2] for part in stages for path in part.joints.values()])
+
+
+def problem_in_hand(hand: Hand, design: Mapping[str, float], free: Mapping[str, Sequence[float]]) -> Problem:
+    """Return the study's problem with ``free`` dimensions between two ends as variables, and the others fixed.
+
+    Raises
+    ------
+    InputError
+        if the study has no objective, or nothing may change.
+    """
+    study = hand.study
+    if study.objective is None:
+        raise MissingInput("objective", "a study that says what to minimise: [objective]", "explore")
+    bounds = {}
+    for p in study.family.parameters:
+        if p.name not in free or p.choices is not None:
+            continue
+        low, high = tightest([Limit(p.name, *sorted(map(float, free[p.name]))), *study.parameter_limits], p.name)
+        bounds[p.name] = (min(low, design[p.name]), max(high, design[p.name]))
+    if not bounds:
+        raise InputError("dimensions", "none", STEADY, "explore")
+    ends = np.array(list(bounds.values()))
+    fixed = {name: value for name, value in design.items() if name not in bounds}
+    return Problem(
+        study.family, tuple(bounds), ends[:, 0], ends[:, 1], fixed, study.objective.output, study.output_limits,
+        study.window, study.accuracy,
+    )  # fmt: skip
+
+
+def improve(problem: Problem, design: Mapping[str, float], should_stop: Callable[[], bool]) -> dict[str, Any]:
+    """Search from a design until it converges or ``should_stop`` returns true, and return the best result so far."""
+    start = np.array([design[name] for name in problem.family.parameter_names])
+    result = search(0, problem, start, should_stop, LOOKS)
+    return {
+        "design": dict(zip(problem.family.parameter_names, result.design.tolist(), strict=True)),
+        "ended": result.ended,
+        "feasible": result.feasible,
+        "active": list(result.active),
+        "looks": result.looks,
+    }

@@ -1,10 +1,15 @@
-"""Steady-state speed of a shaft of constant mean speed, from samples of inertia and torque excess over its turn."""
+"""Even samples of a turn: the coarsest grid that resolves a design, and the steady-state speed of a shaft."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels.effects.speed_fluctuation import Uneven, speed_fluctuation
+from kernels.status import NOT_CONVERGED
 from kernels.types import Array, Status
 
 # Odd grids: the next one is tried for designs that the previous one does not resolve.
@@ -15,6 +20,27 @@ LEFT = 1e-3  # share of J omega^2 that the last of these grids may miss of the t
 PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy by h pi/N at most, N = 2 K + 1
 ERROR = 1e-9
 SLOWEST = 0.9  # largest ratio of the last two eighths of the harmonics: 0.87 with jumps, 0.75 with kinks
+
+Solver: TypeAlias = Callable[[NDArray[np.intp], int], tuple[dict[str, Array], Status]]
+"""``solve(rows, size)``: results (k, ...) of the designs ``rows`` (k,) on a grid of that size, by name, and status."""
+
+
+def on_first_grid(least: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
+    """Solve every design on the first of the ``grids`` that resolves it.
+
+    ``least`` (n,) is the least number of samples of each design; coarser grids are skipped, except the last one.
+    Designs for which ``solve`` returns NOT_CONVERGED are solved again on the next grid.
+    """
+    n, found = len(least), dict[str, Array]()
+    status: Status = np.full(n, NOT_CONVERGED, np.uint8)
+    for size in grids:
+        rows = np.flatnonzero((status == NOT_CONVERGED) & ((least <= size) | (size == grids[-1])))
+        if not rows.size and (found or n):
+            continue
+        part, status[rows] = solve(rows, size)
+        for name, values in part.items():
+            found.setdefault(name, np.empty((n, *values.shape[1:])))[rows] = values
+    return found, status
 
 
 def beyond(values: Array, order: int = 0) -> Array:
