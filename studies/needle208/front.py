@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parent
 ROUNDS = ((0.04, 0.07), (0.035, 0.1))  # deviations of 95 % of the mechanisms [mm], on either side of the study's limit
-LOOKS = 2000  # evaluations of each search
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Bound:
             Limit(x.output, x.minimum, self.deviations[number]) if x.output == "max_abs_dev" else x
             for x in self.problem.limits
         )
-        settings = OptimiseSettings(starts=1, looks=LOOKS)
+        settings = OptimiseSettings(starts=1)
         problem, start = replace(self.problem, limits=limits), self.designs[number][None, :]
         found = robust(problem, [], self.tolerance, settings, should_stop, 1, start)
         assert found is not None  # there is a start
