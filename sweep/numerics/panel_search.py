@@ -81,7 +81,7 @@ def climbed(curves: Curves, panels: Panels, n: int, mode: int, target: float, lo
     np.maximum.at(best, panels.row, panels.peak)
     np.minimum.at(least, panels.row, measured(at_nodes(panels.series), mode).min(axis=1))
     size = best if mode == 0 else best - least
-    tops: list[Top] = []
+    tops = [_given_up(only(panels, panels.row < 0), mode)]  # none: there may be no panel at all
     while panels.row.size:
         # Of tops as high as each other none is dropped by rounding.
         level = LEVEL * EPS * np.maximum(np.abs(best), size)

@@ -17,7 +17,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
 from sweep.families.capabilities import InSeries
 from sweep.quantities.kinds import Request
-from sweep.reductions import peak_search
+from sweep.reductions import rounding
 from sweep.reductions.extrema import true_extrema
 from tests.support.climbing import climbed, turning_points, values
 from tests.support.turn_designs import (
@@ -126,7 +126,7 @@ def test_the_search_of_the_crank_rocker_keeps_the_accuracy_asked_of_hard_designs
 @pytest.mark.parametrize("looked_at", [False, True])
 def test_plain_poses_alone_know_their_errors_by_the_rounding_of_the_inputs_only(hard, looked_at, monkeypatch):
     if not looked_at:
-        monkeypatch.setattr(peak_search, "shaken", lambda family, designs, phi, name: np.zeros(len(designs)))
+        monkeypatch.setattr(rounding, "shaken", lambda family, designs, phi, name: np.zeros(len(designs)))
     designs, pose = hard["long coupler"], "d2psi"
     fine, _ = true_extrema(ALONE, designs, [Request(pose, 0)], 1e-9, locate=True)
     exact = climbed(ALONE, designs, pose, 0, fine[Request(pose, 0)].phi)
