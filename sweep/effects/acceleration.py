@@ -24,6 +24,7 @@ NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 NEEDED = frozenset(NEEDED_NAMES)
 PASSES = 24  # secants until friction and acceleration of a pose agree
 STILL = 2.0**-48  # share of the torques that their rounding may move
+UNSETTLED = 1e-9  # share of the torques; a pose whose balance still misses more has no value
 EVEN = 2 * PANELS  # first panels of a turn: no place of a jump is known beforehand
 TARGET = 1e-8  # relative accuracy of the search where none is asked for
 
@@ -46,7 +47,7 @@ def balanced(scene: Scene, speed: Array, even: Array, rubs: bool, status: Status
     """Acceleration from the balance of torques at each pose: beside kinks of the loads a Fourier series is inaccurate.
 
     ``even`` (n,) is the motor's torque at the mean speed.  Friction depends on the acceleration, and secants find both;
-    ``status`` (n,) is updated.
+    ``status`` (n,) is updated: NOT_CONVERGED where they do not.
     """
     inertia, slope, drive = floats(compute_loads(scene.even(), NEEDED), *NEEDED_NAMES)
     mean, motor, flywheel = (scene.inputs[name][:, None] for name in ("speed", "motor_slope", "flywheel"))
@@ -55,16 +56,18 @@ def balanced(scene: Scene, speed: Array, even: Array, rubs: bool, status: Status
     change: Array = left / inertia
     if not rubs:
         return change
-    still = STILL * (np.abs(left) + np.abs(drive)) / inertia
+    size = (np.abs(left) + np.abs(drive)) / inertia
     step, off = np.zeros_like(change), np.ones_like(change)
     for _ in range(PASSES):
         before, off = off, (left - rubbing_torque(scene, speed, change, status)) / inertia - change
         ratio = np.divide(step, before - off, out=np.ones_like(off), where=(step != 0.0) & (before != off))
-        step = np.where(np.abs(off) > still, ratio * off, 0.0)
+        step = np.where(np.abs(off) > STILL * size, ratio * off, 0.0)
         if not step.any():
             break
         change = change + step
-    return np.where(np.isfinite(off), change, np.nan)
+    settled = np.abs(off) <= UNSETTLED * size
+    np.copyto(status, st.NOT_CONVERGED, where=(status == st.OK) & ~settled.all(axis=1))
+    return np.where(settled, change, np.nan)
 
 
 class Turned(NamedTuple):

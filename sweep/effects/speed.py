@@ -152,7 +152,7 @@ def _compute(scene: Scene, grids: tuple[int, ...], wanted: frozenset[str], rubs:
     change = f"crank_acceleration{SUFFIX[rubs]}"
     if change in wanted:
         speed, even = (found[f"{name}{SUFFIX[rubs]}"] for name in ("crank_speed", "even_torque"))
-        found[change] = balanced(scene, speed, even, rubs, np.zeros(len(even), np.uint8))
+        found[change] = balanced(scene, speed, even, rubs, status)
     return at_poses(scene, found, status, wanted)
 
 
