@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     Table: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 
-FORMS = "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas()"
+FORMS = (
+    "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas(), "
+    "a Series with the values of one design by .to_dict(), a list of designs by pandas.DataFrame(list)"
+)
 MOST_MASS = 10.0  # t: a bare 20 is probably meant in grams
 FEW = 64  # rows of a table that is converted as a whole: extracting single columns takes longer than computing poses
 

@@ -1,4 +1,4 @@
-"""Loads of textbooks: Norton's four-bar by the matrix method, Shigley's ball bearing by ISO 281.
+"""Loads of textbooks: four-bar of Norton, quick return of Marghitu and Dupac, ball bearings by ISO 281.
 
 Tolerances are half a unit of the last printed digit.
 """
@@ -33,17 +33,73 @@ def test_four_bar_of_norton_has_the_printed_forces_and_torque() -> None:
     assert found["drive_torque"] == pytest.approx(243.23, abs=0.005)
 
 
-def test_ball_bearing_of_shigley_has_the_printed_load_and_life() -> None:
-    """Mechanical Engineering Design, a 6210 ball bearing under 500 lbf across and 400 lbf along its shaft at 720 rpm.
+def test_quick_return_of_marghitu_and_dupac_has_the_printed_forces_and_torque() -> None:
+    """Advanced Dynamics, example 6.1: bars of 10 x 1 mm and blocks of 20 x 50 x 1 mm of steel, 500 N at the slider.
 
-    The weight of a crank whose centre is in its first support loads the shaft.
+    The crank pivot is above the rocker pivot, so X of stage 1 points down; X of stage 2 is horizontal.  The rod has the
+    inertia that the book computes, with the mass of a block.
     """
+    bar, block = 8000.0 * 0.01 * 0.001, 8000.0 * 0.02 * 0.05 * 0.001
+
+    def inertia(mass: float, length: float, height: float = 0.01) -> float:
+        return mass * (length**2 + height**2) / 12.0
+
+    design = {"a1": 0.2, "e1": 0.4, "a2": 0.7, "b2": 0.3, "e2": 0.75, "branch2": -1}
+    design |= {"offset2": -np.pi / 2.0, "turn2": np.pi / 2.0, "speed1": 200.0 * np.pi / 30.0}
+    design |= {"m_crank1": 0.2 * bar, "com_crank_x1": 0.1, "j_crank_zz1": inertia(0.2 * bar, 0.2)}
+    design |= {"m_rocker1": 0.7 * bar, "com_rocker_x1": 0.35, "j_rocker_zz1": inertia(0.7 * bar, 0.7)}
+    design |= {"m_block1": block, "j_block_zz1": inertia(block, 0.02, 0.05), "m_slider2": block, "m_crank2": 0.0}
+    design |= {"m_coupler2": 0.3 * bar, "com_coupler_x2": 0.15, "j_coupler_zz2": inertia(block, 0.3)}
+    design |= {"gravity_x1": 9.807, "gravity_y2": -9.807, "load_force2": 500.0}
+    names = [f"force_{x}" for x in ("a_x1", "a_y1", "b_x1", "b_y1", "c_x1", "c_y1", "d_x1", "d_y1")]
+    names += [f"force_{x}" for x in ("a_x2", "a_y2", "b_x2", "b_y2", "c_x2", "c_y2", "d_y2")]
+    found = sweep.evaluate(
+        "inverted_slider_crank+slider_crank", design, ["drive_torque1", *names], phi=np.radians(135.0)
+    ).iloc[0]
+
+    def down(joint: str) -> tuple[float, float]:
+        """A force of stage 1 along the horizontal and the vertical of the book."""
+        return found[f"force_{joint}_y1"], -found[f"force_{joint}_x1"]
+
+    near = {"abs": 5e-4, "rel": 0.0}
+    assert found["drive_torque1"] == pytest.approx(111.518, **near)
+    assert down("a") == pytest.approx((-626.106, 162.525), **near)
+    assert down("b") == pytest.approx((-625.610, 162.864), **near)
+    assert down("c") == pytest.approx((625.114, -163.282), **near)
+    assert (found["force_b_x2"], found["force_b_y2"]) == pytest.approx((-500.685, 124.998), **near)
+    assert (-found["force_c_x2"], -found["force_c_y2"]) == pytest.approx((500.140, -125.037), **near)
+    assert found["force_d_y2"] == pytest.approx(-124.959, **near)
+    # Rocker and second crank are one body in the book: its bearing bears what ours bear together.
+    together = np.add(down("d"), (found["force_a_x2"], found["force_a_y2"]))
+    assert together == pytest.approx((123.647, -38.376), **near)
+
+
+@pytest.mark.parametrize(
+    ("radial", "axial", "speed", "factors", "capacity", "load", "hours", "digit"),
+    [
+        # Shigley, Mechanical Engineering Design: a 6210 under 500 lbf across and 400 lbf along its shaft.
+        (500.0, 400.0, 24.0 * np.pi, (0.56, 1.527, 0.285), 7900.0, 890.8, 16150.0, 5.0),
+        # Wentzell, Machine Design, example 20-1: 2400 lbf across at 1750 rev/min.
+        (2400.0, 0.0, 1750.0 * np.pi / 30.0, (0.56, 1.5, 0.3), 5050.0, 2400.0, 88.73, 0.005),
+    ],
+)
+def test_ball_bearing_has_the_printed_load_and_life(
+    radial: float,
+    axial: float,
+    speed: float,
+    factors: tuple[float, float, float],
+    capacity: float,
+    load: float,
+    hours: float,
+    digit: float,
+) -> None:
+    """The weight of a crank whose centre is in its first support loads the shaft."""
     design = dict(family("slotted").example)
     axis = np.array([0.0, np.sin(design["alpha"]), np.cos(design["alpha"])])
-    weight = 400.0 * axis + [500.0, 0.0, 0.0]
-    design |= {"m_crank": 1.0, "com_crank_z": -2.0, "support_a1": -2.0, "support_a2": -5.0, "speed": 24.0 * np.pi}
+    weight = axial * axis + [radial, 0.0, 0.0]
+    design |= {"m_crank": 1.0, "com_crank_z": -2.0, "support_a1": -2.0, "support_a2": -5.0, "speed": speed}
     design |= {f"gravity_{x}": weight[k] for k, x in enumerate("xyz")}
-    design |= {"radial_factor_a": 0.56, "axial_factor_a": 1.527, "e_limit_a": 0.285, "dynamic_capacity_a": 7900.0}
-    found = sweep.summarise("slotted", design, "mean_load_a1, life_a1").iloc[0]
-    assert found["mean_load_a1"] == pytest.approx(890.8, abs=0.05)
-    assert found["life_a1"] / 3600.0 == pytest.approx(16150.0, abs=5.0)
+    design |= dict(zip(("radial_factor_a", "axial_factor_a", "e_limit_a"), factors, strict=True))
+    found = sweep.summarise("slotted", design | {"dynamic_capacity_a": capacity}, "mean_load_a1, life_a1").iloc[0]
+    assert found["mean_load_a1"] == pytest.approx(load, abs=0.05)
+    assert found["life_a1"] / 3600.0 == pytest.approx(hours, abs=digit)

@@ -62,6 +62,14 @@ def test_tables(table: Any) -> None:
     refused("allowed: a DataFrame of pandas, or a dict of columns", sweep.summarise, "rssr", table, "swing")
 
 
+def test_what_the_message_of_a_wrong_table_advises_is_taken() -> None:
+    refused("a Series with the values of one design by .to_dict()", sweep.summarise, "rssr", FRAME.iloc[0], "swing")
+    refused("a list of designs by pandas.DataFrame(list)", sweep.summarise, "rssr", [ROCKER, ROCKER], "swing")
+    swing = sweep.summarise("rssr", FRAME, "swing")["swing"][0]
+    for table in (FRAME.iloc[0].to_dict(), pd.DataFrame([ROCKER, ROCKER])):
+        assert sweep.summarise("rssr", table, "swing")["swing"][0] == swing
+
+
 def test_a_column_that_stands_twice() -> None:
     table = pd.concat([FRAME, FRAME[["a"]]], axis=1)
     refused("column = 'a'; allowed: each name once; it stands 2 times", sweep.summarise, "rssr", table, "swing")
