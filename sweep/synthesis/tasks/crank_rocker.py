@@ -18,7 +18,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.synthesis.tasks.problem import EngineeringTask, NamedCandidates, Unknown, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, turning
 
 Number: TypeAlias = Array | float
 
@@ -111,7 +111,7 @@ def named(designs: Array, suffix: str = "") -> dict[str, Array]:
 
 
 @dataclass(frozen=True)
-class LocusTask(EngineeringTask):
+class LocusTask(SynthesisTask):
     """A task about a crank-rocker with given limit positions; the fields are those of `EngineeringMethod`."""
 
     swing: float

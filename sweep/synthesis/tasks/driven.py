@@ -12,7 +12,16 @@ from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
 from sweep.families.base import Accuracy, Angles, Array, floats
-from sweep.synthesis.tasks.crank_rocker import RSSR, LocusTask, named, pressure_limit, turn, with_tops
+from sweep.synthesis.tasks.crank_rocker import (
+    RSSR,
+    LocusTask,
+    Number,
+    broadcast_columns,
+    named,
+    pressure_limit,
+    turn,
+    with_tops,
+)
 from sweep.synthesis.tasks.problem import NamedCandidates, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
@@ -154,9 +163,9 @@ class Task8(LocusTask):
 
     def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
-        coupler, offset, ones = x["coupler"], x["offset"], np.ones(len(x["phi1"]))
+        coupler, offset = x["coupler"], x["offset"]
         designs, psi1 = self.drive(x["phi1"], x["f"])
-        shape = np.column_stack([ones, coupler, offset, self.f2_ratio * ones, self.alpha2 * ones, self.branch * ones])
+        shape = broadcast_columns(1.0, coupler, offset, self.f2_ratio, self.alpha2, self.branch)
         # nan if the slider-crank does not turn fully and so has no limit positions
         place = "phi_ext" if self.limit == "extended" else "phi_fold"
         theta = np.asarray(design_outputs(RSSP, shape, [place], EXACT)[place], np.float64)
@@ -164,14 +173,15 @@ class Task8(LocusTask):
         (slide,) = RSSP.values(shape, Angles.of(theta[:, None] + span), "s")
         travel = slide[:, -1] - slide[:, 0]
         a2 = self.stroke / np.abs(travel)
-        columns = named(designs, "1") | {
+        columns: dict[str, Number] = {
+            **named(designs, "1"),
             "a2": a2,
             "b2": a2 * coupler,
             "e2": a2 * offset,
             "f2": a2 * self.f2_ratio,
-            "alpha2": self.alpha2 * ones,
-            "branch2": self.branch * ones,
-            "kappa2": self.kappa * ones,
+            "alpha2": self.alpha2,
+            "branch2": self.branch,
+            "kappa2": self.kappa,
             "offset2": theta - self.kappa * psi1,
         }
         deviation = self._deviation(designs, x["phi1"], psi1, theta, a2[:, None] * shape[:, :4])
@@ -189,8 +199,7 @@ class Task8(LocusTask):
         """Return the largest distance from the dwell position during the dwell."""
         window = np.linspace(-0.5 * self.dwell, 0.5 * self.dwell, WINDOW)
         turned = RSSR.values(designs, Angles.of(phi1[:, None] + window), "psi")[0] - psi1[:, None]
-        constants = np.full((len(designs), 2), [self.alpha2, float(self.branch)])
-        stage = np.column_stack([lengths, constants])
+        stage = broadcast_columns(*lengths.T, self.alpha2, self.branch)
         (s,) = RSSP.values(stage, Angles.of(theta[:, None] + self.kappa * turned), "s")
         largest: Array = np.abs(s - s[:, [WINDOW // 2]]).max(axis=1)
         return largest

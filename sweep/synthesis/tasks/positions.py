@@ -24,7 +24,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     named,
     pressure_limit,
 )
-from sweep.synthesis.tasks.problem import EngineeringTask, NamedCandidates, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, ranges, turning
 
 PLANAR = 1e-12  # |sin(alpha)| below which f has no influence
 
@@ -122,7 +122,7 @@ class Task1(LocusTask):
 
 
 @dataclass(frozen=True)
-class Task2(EngineeringTask):
+class Task2(SynthesisTask):
     """The unknowns are swing, phi0, phi1 and f; closure at the two positions and at both limits are the equations.
 
     The limits hold by the locus, the first position by f, the second one remains as an equation; the two remaining

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -106,25 +106,6 @@ class Candidates(NamedTuple):
     results: dict[str, Array]
 
 
-class SynthesisTask(Protocol):
-    """One of the tasks with its numbers, the argument of `solve`."""
-
-    @property
-    def unknowns(self) -> tuple[Unknown, ...]:
-        """Unknowns of the task."""
-
-    @property
-    def equations(self) -> tuple[str, ...]:
-        """Names of the equations, at most as many as unknowns."""
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Names of the limits."""
-
-    def evaluate(self, x: Array) -> Candidates:
-        """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
-
-
 @dataclass(frozen=True)
 class Solution:
     """A mechanism that solves a task, or the nearest one found if ``feasible`` is false.
@@ -153,7 +134,10 @@ class Solution:
 
 
 class NamedCandidates(NamedTuple):
-    """`Candidates` of a task by name: equations and limits (n,) each, the curve (n, m), the mechanisms."""
+    """`Candidates` of a task by name: equations and limits (n,) each, the curve (n, m), the mechanisms.
+
+    A column of ``results`` that is the same for all candidates may be a number.
+    """
 
     equations: Mapping[str, Array]
     limits: Mapping[str, Array]
@@ -162,8 +146,8 @@ class NamedCandidates(NamedTuple):
 
 
 @dataclass(frozen=True)
-class EngineeringTask(ABC):
-    """Base of the tasks of the engineering method.
+class SynthesisTask(ABC):
+    """One of the tasks of the engineering method with its numbers, the argument of `solve`.
 
     Parameters
     ----------
@@ -197,7 +181,7 @@ class EngineeringTask(ABC):
 
     @property
     def equations(self) -> tuple[str, ...]:
-        """Names of the equations."""
+        """Names of the equations, at most as many as unknowns."""
         return tuple(self._named.equations)
 
     @property
@@ -208,22 +192,21 @@ class EngineeringTask(ABC):
     def evaluate(self, x: Array) -> Candidates:
         """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
         n, named = len(x), self._bounded(x)
-        columns = {name: np.broadcast_to(np.asarray(values, np.float64), n) for name, values in named.results.items()}
-        return Candidates(_stacked(n, named.equations), _stacked(n, named.limits), named.curve, columns)
+        return Candidates(_stacked(n, named.equations), _stacked(n, named.limits), named.curve, dict(named.results))
 
     def _bounded(self, x: Array) -> NamedCandidates:
         """Return the values of candidates x (n, unknowns), with slacks of the bounds in units of their range."""
         named = self.named_candidates(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
         limits = dict(named.limits)
+        results = {
+            name: np.broadcast_to(np.asarray(x, np.float64), len(named.curve)) for name, x in named.results.items()
+        }
         for name, (low, high) in self.bounds.items():
-            if name not in named.results:
-                raise InputError("bounds", name, choices(name, named.results), "task")
-            value = named.results[name]
-            limits[f"{name} not below"], limits[f"{name} not above"] = (
-                (value - low) / (high - low),
-                (high - value) / (high - low),
-            )
-        return named._replace(limits=limits)
+            if name not in results:
+                raise InputError("bounds", name, choices(name, results), "task")
+            limits[f"{name} not below"] = (results[name] - low) / (high - low)
+            limits[f"{name} not above"] = (high - results[name]) / (high - low)
+        return named._replace(limits=limits, results=results)
 
 
 def _stacked(count: int, columns: Mapping[str, Array]) -> Array:

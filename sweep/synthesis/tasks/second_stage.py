@@ -18,8 +18,8 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.synthesis.tasks.crank_rocker import RSSR, named, turn, with_tops
-from sweep.synthesis.tasks.problem import EngineeringTask, NamedCandidates, Unknown, turning
+from sweep.synthesis.tasks.crank_rocker import RSSR, Number, broadcast_columns, turn, with_tops
+from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, turning
 
 RSSP = family("rssp")
 SIDEWAYS = {"along": (-4.0, 6.0), "across": (-4.0, 4.0)}
@@ -50,18 +50,18 @@ class Drive(NamedTuple):
             raise InputError("drive", dict(design), "one crank-rocker that turns fully and oscillates", place)
         return cls(matrix[0], *(float(limits[name][0]) for name in names))
 
-    def columns(self, count: int) -> dict[str, Array]:
-        """Return the parameters of the crank-rocker as columns of stage 1."""
-        return named(np.tile(self.row, (count, 1)), "1")
+    @property
+    def columns(self) -> dict[str, Number]:
+        """Parameters of the crank-rocker as columns of stage 1, the same for all candidates."""
+        return dict(zip((f"{name}1" for name in RSSR.parameter_names), self.row.tolist(), strict=True))
 
 
-def chain_motion(second: str, columns: Mapping[str, Array], *wanted: str) -> list[Array]:
+def chain_motion(second: str, columns: Mapping[str, Number], *wanted: str) -> list[Array]:
     """Return pose outputs of crank-rockers with their second stage over one turn, nan if there is no mechanism."""
     chain = family(["rssr", second])
     # A stage has its default place if the task does not define another.
-    defaults = {p.name: np.full_like(columns["a1"], p.default) for p in chain.parameters if p.default is not None}
-    rows = np.column_stack([(defaults | dict(columns))[name] for name in chain.parameter_names])
-    return chain.values(rows, turn(), *wanted)
+    given = {p.name: p.default for p in chain.parameters if p.default is not None} | dict(columns)
+    return chain.values(broadcast_columns(*(given[name] for name in chain.parameter_names)), turn(), *wanted)
 
 
 def second_pressure_limit(angle: Array, largest: float) -> Array:
@@ -102,7 +102,7 @@ class FourBar:
         rows = np.column_stack([np.broadcast_to(columns.get(p.name, 0.0), n) for p in mechanism.parameters])
         return mechanism.values(rows, angles, *wanted)
 
-    def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
+    def over_the_turn(self, drive: Drive, columns: Mapping[str, Number]) -> tuple[Array, Array | None]:
         """Return acceleration along ``lam2`` and pressure angle, if any, over a turn of the drive, (n, m)."""
         d2s, angle = chain_motion(self.family, columns, "d2s", "pressure_angle2")
         return d2s, angle
@@ -124,14 +124,15 @@ class RockerSlider(FourBar):
         point, moving = (1.0 - share) * pin + share * slide, (1.0 - share) * 1j * pin + share * ds
         return np.asarray(point, np.complex128), np.asarray(moving, np.complex128)
 
-    def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
+    def over_the_turn(self, drive: Drive, columns: Mapping[str, Number]) -> tuple[Array, Array | None]:
         """Return acceleration along ``lam2`` and pressure angle over a turn of the drive, (n, m)."""
         d2s, angle = chain_motion(self.family, columns, "d2s", "pressure_angle2")
         psi, dpsi, d2psi = RSSR.values(drive.row[None, :], turn(), "psi", "dpsi", "d2psi")
-        kappa, offset, lam = (columns[name][:, None] for name in ("kappa2", "offset2", "lam2"))
+        names = ("kappa2", "offset2", "lam2", "xi2", "eta2", "b2", "a2")
+        kappa, offset, lam, xi, eta, b, a = (np.reshape(columns[name], (-1, 1)) for name in names)
         with np.errstate(invalid="ignore"):  # if a linkage does not reach, all its values are nan
-            share = ((columns["xi2"] + 1j * columns["eta2"]) / columns["b2"])[:, None]
-            pin = columns["a2"][:, None] * np.exp(1j * (kappa * psi + offset - lam)) * (1j * kappa * d2psi - dpsi**2)
+            share = (xi + 1j * eta) / b
+            pin = a * np.exp(1j * (kappa * psi + offset - lam)) * (1j * kappa * d2psi - dpsi**2)
             return np.real((1.0 - share) * pin + share * d2s * np.exp(-1j * lam)), angle
 
 
@@ -143,10 +144,10 @@ class RockerSlotted(FourBar):
     dimensions: ClassVar[Mapping[str, str]] = {"frame": "e", "rod": "Lw"}
     coordinates = ("x_p", "y_p", "dx_p", "dy_p")
 
-    def over_the_turn(self, drive: Drive, columns: Mapping[str, Array]) -> tuple[Array, Array | None]:
+    def over_the_turn(self, drive: Drive, columns: Mapping[str, Number]) -> tuple[Array, Array | None]:
         """Return acceleration along ``lam2`` over a turn of the drive, (n, m), and None for the pressure angle."""
         d2x, d2y = chain_motion(self.family, columns, "d2x_p", "d2y_p")
-        lam = columns["lam2"][:, None]
+        lam = np.reshape(columns["lam2"], (-1, 1))
         return d2x * np.cos(lam) + d2y * np.sin(lam), None
 
 
@@ -154,7 +155,7 @@ STAGES: Mapping[str, FourBar] = {one.family: one for one in (FourBar(), RockerSl
 
 
 @dataclass(frozen=True)
-class Task6(EngineeringTask):
+class Task6(SynthesisTask):
     """The unknowns are shape and place of a second stage whose working point moves from J1 to J2 with given tangents.
 
     Size, direction and place of the stage follow from J1 and J2 (they are similarity transformations), so the unknowns
@@ -199,7 +200,6 @@ class Task6(EngineeringTask):
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         first, stage, theta = self._first, STAGES[self.second], x["theta1"]
         shape = {name: x[name] for name in stage.shape}
-        ones = np.ones(len(theta))
         angles = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
         point, moving = stage.path(shape, angles, self.branch)
         chord = complex(*self.end) - complex(*self.start)
@@ -211,13 +211,13 @@ class Task6(EngineeringTask):
         turned = along * wanted.conj()
         size, beta = np.abs(similarity), np.angle(similarity)
         origin = complex(*self.start) - similarity * point[:, 0]
-        columns = first.columns(len(theta)) | {
+        columns = first.columns | {
             "a2": size,
             **{f"{stage.dimensions[name]}2": size * part for name, part in shape.items()},
             "lam2": np.angle(chord) - beta,
-            "h2": 0.0 * ones,
-            "branch2": self.branch * ones,
-            "kappa2": self.kappa * ones,
+            "h2": 0.0,
+            "branch2": self.branch,
+            "kappa2": self.kappa,
             "offset2": theta - self.kappa * first.psi_ext,
         }
         d2s, angle = stage.over_the_turn(first, columns)
@@ -235,7 +235,7 @@ class Task6(EngineeringTask):
 
 
 @dataclass(frozen=True)
-class Task7(EngineeringTask):
+class Task7(SynthesisTask):
     """The unknowns are a2, b2, e2 and the angle of the second crank; stroke and both accelerations are the equations.
 
     At a limit of stage 1 its velocity vanishes, so the output's acceleration there is psi'' S', and S' = w/psi''.
@@ -296,18 +296,10 @@ class Task7(EngineeringTask):
     def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         theta, first = x["theta1"], self._first
-        ones = np.ones(len(theta))
-        columns = first.columns(len(theta)) | {
-            "a2": x["a2"],
-            "b2": x["b2"],
-            "e2": x["e2"],
-            "f2": self.f2 * ones,
-            "alpha2": self.alpha2 * ones,
-            "branch2": self.branch * ones,
-            "kappa2": self.kappa * ones,
-            "offset2": theta - self.kappa * first.psi_ext,
-        }
-        stage = np.column_stack([columns[f"{name}2"] for name in RSSP.parameter_names])
+        columns = first.columns | {f"{name}2": x[f"{name}2"] for name in ("a", "b", "e")}
+        columns |= {"f2": self.f2, "alpha2": self.alpha2, "branch2": self.branch, "kappa2": self.kappa}
+        columns["offset2"] = theta - self.kappa * first.psi_ext
+        stage = broadcast_columns(*(columns[f"{name}2"] for name in RSSP.parameter_names))
         ends = Angles.of(np.column_stack([theta, theta + self.kappa * first.swing]))
         s, ds = RSSP.values(stage, ends, "s", "ds")
         wanted = {"start": self.start_acceleration, "end": self.end_acceleration}

@@ -15,7 +15,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Array, floats
 from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, outputs_of, pressure_limit
-from sweep.synthesis.tasks.problem import EngineeringTask, NamedCandidates, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, ranges, turning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +37,7 @@ class Setting(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Task3(EngineeringTask):
+class Task3(SynthesisTask):
     """The unknowns are phi1, f, and for every further setting the value of the one dimension that differs.
 
     Parameters
