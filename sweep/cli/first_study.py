@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -16,7 +18,8 @@ from sweep.families.base import Family, March
 from sweep.families.capabilities import Assembly
 from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, parts, stem
-from sweep.pages import rendered
+from sweep.pages import TEMPLATES, rendered
+from sweep.quantities.units import read
 from sweep.study.toml import design_entries, toml
 
 # Units of the examples by unit word: those with forces or masses are in SI, the others in any length unit.
@@ -41,49 +44,15 @@ WIDTH = 56  # column of the explanations
 OFFSETS = 12  # angles tried between the crank of a later stage and the rocker before it, over the turn
 POSES = 72  # of each
 
-# Starts that turn with pressure angles below 45 degrees and room on either side, where the example, from which hard
-# inputs are derived, does not [mm; SI with masses or forces; rad].
-_DEG = math.pi / 180.0
-_FOUR_BAR = {"a": 10.0, "b": 26.0, "c": 34.0, "e": 40.0, "xi": 28.0, "eta": -24.0, "branch": 1.0}
-_RSSR = {"a": 10.0, "b": 36.0, "c": 26.0, "e": 40.0, "f": 6.0, "g": -4.0, "alpha": 40.0 * _DEG, "branch": -1.0}
-_FEED = {
-    "h_a": 4.0, "h_b": 34.0, "h_c": 16.0, "h_e": 35.0, "rh": 12.0, "xE": 56.0, "yE": 7.0, "rE": 1.8, "q": 26.0,
-    "fx": -17.0, "fy": 6.0, "tx": -3.0, "ty": 9.0, "y_plate": 15.0,
-}  # fmt: skip
-STARTS: Mapping[str, Mapping[str, float]] = {
-    "rssr": _RSSR,
-    "four_bar": _FOUR_BAR,
-    "guide": _FOUR_BAR | {"lam": 129.8 * _DEG, "h": 26.0},
-    "five_link": {
-        "a": 10.0, "b": 36.0, "c": 22.0, "e": 40.0, "f": 6.0, "g": -4.0, "alpha": 40.0 * _DEG, "h": 3.0, "s2": 1.0,
-    },
-    "kim_dison": {"r": 10.0, "l": 40.0, "h": 20.0, "a": 40.0, "b": 15.0, "branch": -1.0},
-    "spherical_looper": {f"{name}1": x for name, x in _RSSR.items()} | {
-        "f1": 11.0, "g1": 0.0, "alpha1": 70.0 * _DEG, "o": 14.0, "delta": 70.0 * _DEG, "gamma": 160.0 * _DEG,
-        "c0x": -10.0, "c0y": 17.0, "c0z": 9.0, "p0x": -25.0, "p0y": 19.0, "p0z": 28.0, "a2": 3.0, "b2": 68.0,
-        "x2": 3.0, "y2": -41.0, "z2": -35.0, "theta2": 80.0 * _DEG, "beta2": 98.0 * _DEG, "offset2": 5.0 * _DEG,
-    },
-    "cylindrical_looper": {
-        "a1": 10.0, "b1": 39.0, "c1": 25.0, "e1": 44.0, "f1": 10.0, "g1": -6.0, "alpha1": 30.0 * _DEG,
-        "a2": 2.0, "b2": 25.0, "e2": -1.0, "f2": -5.0, "alpha2": 23.0 * _DEG, "offset2": 40.0 * _DEG, "slides": 1.0,
-        "p0x": 21.0, "p0y": -1.0, "p0z": 36.0,
-    },
-    "feed_triad": {
-        "h_a": 5.0, "h_b": 34.0, "h_c": 16.0, "h_e": 35.0, "rh": 12.0, "xE2": 20.0, "yE2": -24.0, "rE2": 1.5,
-        "dE2": 17.0 * _DEG, "xE3": 55.0, "yE3": -23.0, "rE3": 1.5, "dE3": 29.0 * _DEG, "f1x": -10.0, "f1y": -7.0,
-        "f2x": -8.0, "f2y": -9.0, "f3x": 12.0, "f3y": -4.0, "q1": 14.0, "q2": 26.0, "q3": 27.0, "x0": 34.5, "y0": 9.0,
-        "chi0": 0.0, "h_sigma": -1.0,
-    },
-    "feed_foot": {name: 1e-3 * x for name, x in _FEED.items()} | {
-        "dh": -17.0 * _DEG, "dE": 46.0 * _DEG, "h_sigma": -1.0, "bar_branch": -1.0,
-        "m": 0.05, "k": 1500.0, "F0": 6.0, "omega": 200.0,
-    },
-    "rssr+guide": {
-        "a1": 12.0, "b1": 31.5, "c1": 17.6, "e1": 28.0, "f1": -22.0, "g1": 0.0, "alpha1": 90.0 * _DEG, "branch1": 1.0,
-        "a2": 18.7, "b2": 23.1, "c2": 41.5, "e2": 60.0, "xi2": 16.9, "eta2": -6.5, "lam2": 112.5 * _DEG, "h2": -8.9,
-        "branch2": 1.0, "offset2": 104.5 * _DEG,
-    },
-}  # fmt: skip
+
+@lru_cache
+def first_designs() -> Mapping[str, Mapping[str, float]]:
+    """Read the designs to begin with where a family's example would not do, by family [mm; SI; rad]."""
+    tables = tomllib.loads((TEMPLATES / "first_designs.toml").read_text("utf-8"))
+    return {
+        name: {key: read(x, "rad") if isinstance(x, str) else x for key, x in design.items()}
+        for name, design in tables.items()
+    }
 
 
 def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float] | None = None) -> str:
@@ -205,8 +174,8 @@ def goal_of(wanted: list[str]) -> str:
 
 def start_of(family: Family) -> Mapping[str, float]:
     """Return the design to begin with: a start, or the example at the size of a machine [mm; SI; rad]."""
-    if family.name in STARTS:
-        return STARTS[family.name]
+    if family.name in first_designs():
+        return first_designs()[family.name]
     if len(family.stages) > 1:
         own = {f"{name}{s.number}": x for s in family.stages for name, x in start_of(s.family).items()}
         return own | _offsets(family, own)

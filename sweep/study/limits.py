@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 from sweep.errors import InputError, choices
 from sweep.families.base import Family, Output
@@ -19,33 +22,13 @@ from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry
 
 
-class MachineSetting(NamedTuple):
-    """Bounds in a machine's manual, (least, most) [mm] each; None if the manual does not state them."""
-
-    source: str
-    rise: tuple[float, float] | None = None
-    clearance: tuple[float, float] | None = None
-    above_eye: tuple[float, float] | None = None
-    reach: tuple[float, float] | None = None
-    back_height: tuple[float, float] | None = None
+TABLE = Path(__file__).parents[1] / "settings.toml"
 
 
-# `reach` is the looper's gauge at its far end, as manuals measure it.  A single value is given a band of 0.1 mm.
-SETTINGS = {
-    "juki-mo-104d": MachineSetting("Juki MO-104D, overlock", clearance=(0.01, 0.1), back_height=(-0.2, 0.2)),
-    "janome-213d": MachineSetting("Janome MyLock 213D, overlock", clearance=(0.0, 0.05)),
-    "pfaff-4772": MachineSetting("Pfaff coverlock 4772, overlock and cover stitch", clearance=(0.0, 0.05)),
-    "juki-mf-7200d": MachineSetting("Juki MF-7200D, cover stitch", clearance=(0.0, 0.05)),
-    "janome-1200d": MachineSetting("Janome 1200D, overlock with chain looper", clearance=(0.0, 0.05), reach=(1.5, 1.8)),
-    "union-special-56500r": MachineSetting("Union Special 56500R, chain stitch", reach=(3.1, 3.3)),
-    "duerkopp-adler-838": MachineSetting(
-        "Duerkopp Adler 838, hook", rise=(2.4, 2.6), clearance=(0.02, 0.1), above_eye=(1.4, 1.6)
-    ),
-    "duerkopp-adler-867": MachineSetting("Duerkopp Adler 867, hook", rise=(1.9, 2.1), clearance=(0.0, 0.1)),
-    "pfaff-1243": MachineSetting("Pfaff 1243, hook", rise=(2.0, 2.4), clearance=(0.05, 0.1), above_eye=(0.8, 1.0)),
-    "juki-lu-2210n-7": MachineSetting("Juki LU-2210N-7, hook", rise=(1.8, 2.2), above_eye=(1.2, 1.6)),
-    "janome-1600p": MachineSetting("Janome 1600P, hook", rise=(1.9, 2.1), clearance=(0.0, 0.1)),
-}
+@lru_cache
+def settings() -> Mapping[str, Mapping[str, Any]]:
+    """Read the settings of real machines: source, and (least, most) of rise, clearance ... [mm], by machine."""
+    return tomllib.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def limits_of_settings(file: StudyFile) -> list[Limit]:
@@ -60,12 +43,11 @@ def limits_of_settings(file: StudyFile) -> list[Limit]:
         if "take" not in table:
             file.faults.value(key, name, "nothing here: settings are limits of a relation take")
             continue
-        setting = SETTINGS.get(name) if isinstance(name, str) else None
+        setting = settings().get(name) if isinstance(name, str) else None
         if setting is None:
-            file.faults.value(key, name, choices(str(name), SETTINGS))
+            file.faults.value(key, name, choices(str(name), settings()))
             continue
-        bounds = {what: ends for what, ends in setting._asdict().items() if what != "source" and ends is not None}
-        limits += [Limit(f"{relation}_{what}", *ends) for what, ends in bounds.items()]
+        limits += [Limit(f"{relation}_{what}", *ends) for what, ends in setting.items() if what != "source"]
     return limits
 
 

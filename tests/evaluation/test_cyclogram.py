@@ -12,7 +12,7 @@ from click.testing import CliRunner
 import sweep
 from sweep.cli.main import main
 from sweep.study import load_study
-from sweep.study.limits import SETTINGS
+from sweep.study.limits import settings
 from tests.families.machines.test_hand_made_stitches import DESIGN, PHI, machine_of
 
 CRANK, ROD = 20.0, 70.0
@@ -127,7 +127,7 @@ def test_windows_and_settings_of_a_study_are_limits(tmp_path):
     assert limits["phi_a"] == pytest.approx((math.radians(205.0), math.radians(230.0)))
     assert limits["looper.phi0"] == pytest.approx((math.radians(170.0), math.radians(190.0)))
     assert limits["looper.swing"] == pytest.approx((math.radians(40.0), math.radians(60.0)))
-    assert limits["a_clearance"] == SETTINGS["juki-mo-104d"].clearance
+    assert limits["a_clearance"] == tuple(settings()["juki-mo-104d"]["clearance"])
     assert limits["a_back_height"] == (-1.0, 1.0)  # the study's own, not the machine's 0.2
 
 
@@ -153,8 +153,10 @@ def test_faults_of_cyclogram_and_settings_are_said(tmp_path, old, new, words):
 
 def test_page_lists_the_settings_that_there_are():
     text = (Path(sweep.__file__).parents[1] / "docs" / "stitch.md").read_text()
-    for name, setting in SETTINGS.items():
+    columns = ("rise", "clearance", "above_eye", "reach", "back_height")
+    for name, setting in settings().items():
+        assert set(setting) <= {"source", *columns}
         (row,) = (line for line in text.splitlines() if line.startswith(f"| `{name}` |"))
         cells = [cell.strip() for cell in row.split("|")[2:-1]]
-        assert cells[0] == setting.source
-        assert cells[1:] == ["" if ends is None else f"{ends[0]:g} to {ends[1]:g}" for ends in setting[1:]]
+        assert cells[0] == setting["source"]
+        assert cells[1:] == [f"{ends[0]:g} to {ends[1]:g}" if (ends := setting.get(x)) else "" for x in columns]
