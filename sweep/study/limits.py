@@ -21,7 +21,6 @@ from sweep.study.file import Faults, Key, Number, Section, StudyFile, holds, rea
 from sweep.study.locus import prescribed_limits
 from sweep.study.parameter import Entry
 
-
 TABLE = Path(__file__).parents[1] / "settings.toml"
 
 
