@@ -208,7 +208,10 @@ def _checked_column(
     if p.sign and (p.not_zero or p.wrong_sign(least)):
         refuse_rows(p.wrong_sign(values), values, p.name, f"a {p.sign} {p.unit}")
     if p.unit == "mass" and largest > MOST_MASS:
-        allowed = f'a mass below {MOST_MASS:g} t, as bare masses are tonnes: "20 g", or 2e-5'
+        allowed = (
+            f'a mass below {MOST_MASS:g} t, as bare masses are tonnes: "20 g", or 2e-5; '
+            'with lengths in metres "20 kg" and "0.3 m"'
+        )
         refuse_rows(values > MOST_MASS, values, p.name, allowed)
     if p.choices is not None and not (least == largest and least in p.choices):
         refuse_rows(np.logical_and.reduce([values != x for x in p.choices]), values, p.name, p.choice)
