@@ -180,18 +180,21 @@ def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> C
     """Compute maxima over the turn refined between samples to ``accuracy.target``, with error estimates."""
     assert accuracy.target is not None
     n, names = len(designs), ("dpsi", "d2psi", "d3psi")
-    status, phi, error, phi_error = np.empty(n, np.uint8), *(np.empty((3, n)) for _ in range(3))
+    status, error = np.empty(n, np.uint8), np.empty((3, n))
+    placed = not wanted.isdisjoint(f"phi_max_abs_{x}" for x in names)
+    phi, phi_error = (np.empty((3, n)), np.empty((3, n))) if placed else (None, None)
     most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in names]
     rssr.true_maxima(designs, sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
-    # Perpendicular axes and g = 0: return and forward stroke are alike; of two maxima the first of the turn counts.
-    even = (designs[:, 5] == 0.0) & (np.abs(np.cos(designs[:, 6])) < 1e-15)
-    phi[:, even] = np.minimum(phi, TWO_PI - phi)[:, even]
+    if phi is not None:
+        # Perpendicular axes and g = 0: return and forward stroke are alike; of two maxima the first of the turn counts.
+        even = (designs[:, 5] == 0.0) & (np.abs(np.cos(designs[:, 6])) < 1e-15)
+        phi[:, even] = np.minimum(phi, TWO_PI - phi)[:, even]
     columns: Columns = {"status": status}
     for order, name in enumerate(names):
-        pairs = ((f"max_abs_{name}", most[order], error), (f"phi_max_abs_{name}", phi[order], phi_error))
-        for key, values, err in pairs:
-            if key in wanted and values is not None:
-                columns |= {key: values, f"err_{key}": err[order]}
+        for key, values, err in ((f"max_abs_{name}", most, error), (f"phi_max_abs_{name}", phi, phi_error)):
+            column = None if values is None else values[order]
+            if key in wanted and column is not None and err is not None:
+                columns |= {key: column, f"err_{key}": err[order]}
     return columns
 
 

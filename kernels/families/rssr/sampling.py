@@ -125,22 +125,23 @@ def finish(
         trusted = trusted & (peak - m[i + _RIGHT] >= _NEXT * bend * after * after)
         m[i + ERROR] = rise if trusted else math.inf
         if error is not None or phi_error is not None:
-            _estimate(m, i, order, peak, step, math.sqrt(abs(y / d2y)))
+            of = Loop(m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE])
+            relative, slope = rounding(order, of, m[i + _U], m[i + _V], peak)
+            m[i + ROUNDING] = relative
+            if phi_error is not None:
+                m[i + REACH] = _reach(m, i, order, step, math.sqrt(abs(y / d2y)), relative, slope)
         m[i + HEIGHT], m[i + LAST] = peak, step
 
 
 @inline
-def _estimate(m: Array, i: int, order: int, peak: float, step: float, across: float) -> None:
-    """Write the relative rounding error of a peak and the error of its place; ``across`` is its width."""
-    of = Loop(m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE])
-    relative, slope = rounding(order, of, m[i + _U], m[i + _V], peak)
+def _reach(m: Array, i: int, order: int, step: float, across: float, relative: float, slope: float) -> Any:
+    """Error of the place of a peak; ``across`` is the peak's width, the others are rounding errors."""
     # The error after a step of Newton's method is quadratic in the step, with a factor estimated from the step before;
     # for the jerk the slope is good to a thousandth.
     last = m[i + LAST]
     left = 4.0 * largest(abs(step) / m[i + _WIDTH], step * step / (last * last + 1e-300))
     left += 1e-3 if order == 3 else 0.0
-    m[i + ROUNDING] = relative
-    m[i + REACH] = left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
+    return left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
 
 
 _AGAIN: Any = np.int64(3)  # more steps; for a literal number in the call `refine` would be compiled once more

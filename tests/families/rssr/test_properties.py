@@ -13,6 +13,9 @@ from hypothesis import strategies as hs
 
 from kernels import status as st
 from kernels.families import rssr
+from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
+from sweep.families.base import Accuracy
 from tests.support.rssr_designs import JOINT_NAMES, POSE_NAMES, limits, margins, maxima, poses, random_designs
 
 DESIGNS = random_designs(300, 30)
@@ -132,6 +135,16 @@ def test_order_of_designs_and_size_of_the_table_do_not_matter():
         for name, column in whole.items():
             np.testing.assert_array_equal(shuffled[name], column[order], err_msg=name)
             np.testing.assert_array_equal(alone[name], column[17:18], err_msg=name)
+
+
+def test_maxima_and_their_places_have_the_bits_alone_that_they_have_together():
+    names = [f"{kind}_abs_d{order}psi" for kind in ("max", "phi_max") for order in ("", "2", "3")]
+    together = design_outputs(family("rssr"), DESIGNS, names, Accuracy(target=1e-8))
+    assert 0 < np.count_nonzero(together["status"] == st.OK) < len(DESIGNS)
+    for wanted in ([name] for name in names):
+        alone = design_outputs(family("rssr"), DESIGNS, wanted, Accuracy(target=1e-8))
+        for name, column in alone.items():
+            np.testing.assert_array_equal(column, together[name], err_msg=f"{name} of {wanted}")
 
 
 def test_dense_kernel_agrees_with_poses():
