@@ -20,10 +20,28 @@ def _leave(number: int, frame: FrameType | None) -> None:
     os._exit(128 + number)
 
 
-def _finish() -> None:
-    gc.freeze()  # all remaining objects live until the end: a last collection took a quarter of a second
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
+class Ending:
+    """The end of the process, after everything that Python calls at exit.
+
+    It skips the destructors of libraries: threads of pyarrow may still hold a file, which aborts the program
+    (apache/arrow 34314).  Output that cannot be written is left to Python, which says so.
+    """
+
+    def __init__(self) -> None:
+        self.code: int | None = None  # None: an error of the program ends it
+
+    def __call__(self) -> None:
+        """End the process with the exit code."""
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+        if self.code is None:
+            return
+        try:
+            sys.stdout.flush()
+            sys.stderr.flush()
+        except (OSError, ValueError):  # a full disk, or a stream that is closed
+            return
+        os._exit(self.code)
 
 
 def main() -> None:
@@ -31,13 +49,15 @@ def main() -> None:
     # A subcommand handles signals itself; before and after it a signal may end the process at once.
     for number in SIGNALS:
         signal.signal(number, _leave)
-    atexit.register(_finish)  # registered first, so called last
+    ending = Ending()
+    atexit.register(ending)  # registered first, so called last
     # Compiling and reading create many objects that live until the end; collecting among them early is a waste.
     gc.set_threshold(NEW_OBJECTS)
     try:
         command_line()
     except SystemExit as leaving:
         code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+        ending.code = code
         if code not in SIGNALLED:
             # The output is written: a signal during Python's shutdown ends the process with the same exit code.
             for number in SIGNALS:

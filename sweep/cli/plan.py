@@ -14,7 +14,16 @@ from sweep.cli.families import aligned, main_outputs
 from sweep.cli.options import SMOKE, STUDY
 from sweep.effects.advice import findings, left_out, tree
 from sweep.effects.loads import POINT
-from sweep.engine.estimate import LEAST_KEPT, Estimate, check_budget, duration, estimate, other_accuracies, searches
+from sweep.engine.estimate import (
+    LEAST_KEPT,
+    Estimate,
+    check_budget,
+    compiling,
+    duration,
+    estimate,
+    other_accuracies,
+    searches,
+)
 from sweep.errors import how_many
 from sweep.evaluation.summaries import output
 from sweep.families.base import Family
@@ -48,7 +57,7 @@ def check(study: Path, jobs: int, smoke: bool) -> None:
         from sweep.proof.question import question_of
 
         question_of(model)  # raises if the proof is not supported
-    with Phases(show=True) as phases:
+    with Phases(show=True) as phases, compiling(phases):
         sample = pilot(model, lambda done, of: phases.say("planning", done, of))
         cost = estimate(model, jobs, known=sample)
         others = other_accuracies(model, jobs, lambda done, of: phases.say("other accuracies", done, of), sample)

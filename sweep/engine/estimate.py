@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
+from numba.core.event import Event, Listener, install_listener
 
 from sweep.chunks.cascade import CALL_SECONDS, levels
 from sweep.chunks.plan import Pilot, choose_chunk_size, describe_columns, pilot, pilot_at, row_bytes
 from sweep.errors import BudgetError, how_many
 from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 from sweep.families.names import is_error, is_flag
+from sweep.jobs.progress import Phases
 from sweep.reductions.steps import certified_names, is_windowed
 from sweep.study.load import study_from_data, with_accuracy
 from sweep.study.study import OptimiseSettings, Study
@@ -250,3 +253,31 @@ def duration(seconds: float) -> str:
     if seconds < 120.0:
         return f"{float(f'{seconds:.2g}'):g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
+
+
+class Compiled(Listener):
+    """Counts the functions that numba has compiled, and reports each new count."""
+
+    def __init__(self, tell: Callable[[int], None]) -> None:
+        self.functions, self.tell = 0, tell
+        tell(0)
+
+    def on_start(self, event: Event) -> None:
+        """Ignore the start of a compilation."""
+
+    def on_end(self, event: Event) -> None:
+        """Count a finished compilation, and report the count."""
+        self.functions += 1
+        self.tell(self.functions)
+
+
+@contextmanager
+def compiling(phases: Phases) -> Iterator[None]:
+    """Report the functions that are compiled within this context, between the phases of the caller."""
+
+    def tell(functions: int) -> None:
+        if functions:
+            phases.say("compiling", functions, unit="functions")
+
+    with install_listener("numba:compile", Compiled(tell)):
+        yield

@@ -21,14 +21,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from numba.core.event import Event, Listener, install_listener
+from numba.core.event import install_listener
 
 from sweep import optimise
 from sweep.chunks.chunk import asked_outputs, warm, warm_step
 from sweep.chunks.plan import Plan
 from sweep.dataset import files, store
 from sweep.dataset.lock import locked
-from sweep.engine.estimate import check_budget, estimate
+from sweep.engine.estimate import Compiled, check_budget, estimate
 from sweep.engine.opening import is_part, known_folder, open_plan, part_range, plan_note
 from sweep.engine.searches import refuse_unprovable, search, stages_of
 from sweep.engine.worker import ChunkTask, Done
@@ -207,22 +207,6 @@ class KernelStep:
         return (
             f"steps, {how_many(functions, 'function')} compiled for {', '.join(names[:3])}{' ...' * (len(names) > 3)}"
         )
-
-
-class Compiled(Listener):
-    """Counts the functions that numba has compiled, and reports each new count."""
-
-    def __init__(self, tell: Callable[[int], None]) -> None:
-        self.functions, self.tell = 0, tell
-        tell(0)
-
-    def on_start(self, event: Event) -> None:
-        """Ignore the start of a compilation."""
-
-    def on_end(self, event: Event) -> None:
-        """Count a finished compilation, and report the count."""
-        self.functions += 1
-        self.tell(self.functions)
 
 
 def _compile(study: Study, jobs: int, phases: Phases) -> None:

@@ -22,6 +22,7 @@ TICKER = "linksweep: progress"
 ENOUGH, ALIKE = 0.1, 2
 SCALED = 10_000  # numbers from which a bar counts in thousands and millions
 BAR = "{desc}: {n_fmt} of {total_fmt}{unit} [{elapsed}]"  # without the remaining time
+UNCOUNTED = "{desc}: {n_fmt}{unit} [{elapsed}]"  # without a total
 AT_MOST = "at most"  # marks a unit whose total is a maximum, so that neither share nor remaining time is known
 
 Say: TypeAlias = Callable[[str, int, int, str], None]
@@ -92,7 +93,7 @@ class Progress:
             from tqdm import tqdm
 
             self.bar = tqdm(
-                desc=self.shown, bar_format=BAR, total=total or None, initial=done, unit=f" {unit}",
+                desc=self.shown, bar_format=self._form(), total=total or None, initial=done, unit=f" {unit}",
                 unit_scale=total >= SCALED, file=self.stream, delay=FIRST_SECONDS if quiet else 0.0, leave=not quiet,
             )  # fmt: skip
 
@@ -123,12 +124,16 @@ class Progress:
         done, total = self.done - self.first, self.total - self.first
         return not self.at_most and done >= ALIKE and ENOUGH * total <= done < total
 
+    def _form(self) -> str | None:
+        """Format of the bar; None for tqdm's own, with the remaining time."""
+        return None if self.foreseen else BAR if self.total else UNCOUNTED
+
     def advance(self, designs: int) -> None:
         """Add finished designs to the count."""
         with self._listener():
             self.done, self.moved = self.done + designs, time.monotonic()
             if self.bar is not None:
-                self.bar.bar_format = None if self.foreseen else BAR
+                self.bar.bar_format = self._form()
                 self.bar.update(designs)
             else:
                 self._line_if_due()
@@ -139,7 +144,7 @@ class Progress:
             self.total, self.unit = total, self.unit if unit is None else unit
             if self.bar is not None:
                 self.bar.total, self.bar.unit, self.bar.unit_scale = total or None, f" {self.unit}", total >= SCALED
-                self.bar.bar_format = None if self.foreseen else BAR
+                self.bar.bar_format = self._form()
 
     def _tick(self) -> None:
         while not self.over.wait(TICK_SECONDS):
@@ -178,6 +183,8 @@ class Progress:
             share = "" if self.at_most else f" ({self.done / self.total:.0%})"
             unit, comma, more = self.unit.partition(", ")
             text += f"{self.done} of {self.total} {unit}{share}{comma}{more}, "
+        elif self.done:
+            text += f"{self.done} {self.unit}, "
         text += f"{seconds:.0f} s"
         if self.foreseen and (left := self._left(self.line_time)) > 0.0:
             text += f", {left:.0f} s left"

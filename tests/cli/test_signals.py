@@ -143,3 +143,25 @@ def test_a_signal_after_the_answer_keeps_the_answers_exit_code() -> None:
     process.send_signal(signal.SIGTERM)
     rest, _ = process.communicate(timeout=20)
     assert process.returncode == 0 and "rssr" in said + rest
+
+
+def test_the_end_skips_what_libraries_do_after_python() -> None:
+    """Threads of a library that outlive the work abort a program in its destructors; here an exit handler of C does."""
+    program = """
+import atexit, ctypes, sys
+import sweep.__main__ as program
+abort = ctypes.CFUNCTYPE(None)(lambda: ctypes.CDLL(None).abort())
+ctypes.CDLL(None).__cxa_atexit(abort, None, None)
+work = program.command_line
+def then():
+    atexit.register(lambda: print("python's own"))
+    work()
+program.command_line = then
+sys.argv = ["sweep", *sys.argv[1:]]
+program.main()
+"""
+    for words, code in ((["families", "rssr"], 0), (["family"], 2)):
+        done = subprocess.run(
+            [sys.executable, "-c", program, *words], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
+        )
+        assert done.returncode == code and done.stdout.endswith("python's own\n"), done.stderr

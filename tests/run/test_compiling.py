@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import nullcontext
+from pathlib import Path
+from typing import Any
 
 import pytest
+from click.testing import CliRunner
+from numba import njit
 
 from kernels.descent.descents import descend, initial_merits
 from sweep.chunks.chunk import asked_outputs
+from sweep.chunks.plan import Pilot, pilot
+from sweep.cli.plan import check
 from sweep.engine import run as engine
 from sweep.jobs.progress import Phases
 from sweep.study import load_study
-from tests.support.engine_study import ROOT
+from tests.support.engine_study import ROOT, write_study
 
 
 @pytest.mark.parametrize(
@@ -59,3 +66,17 @@ def test_what_the_search_for_starts_needs_is_compiled_too() -> None:
     assert step.count == len(asked_outputs(study)) + 1
     step(step.count - 1)
     assert descend.nopython_signatures and initial_merits.nopython_signatures
+
+
+def test_check_tells_what_it_compiles(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pilot that compiles is no longer told as planning; the first two seconds are not waited for."""
+    monkeypatch.setattr("sweep.jobs.progress.FIRST_SECONDS", -1.0)
+
+    def compiling(*given: Any) -> Pilot:
+        njit(lambda x: 2.0 * x)(1.0)
+        return pilot(*given)
+
+    monkeypatch.setattr("sweep.cli.plan.pilot", compiling)
+    done = CliRunner().invoke(check, [str(write_study(tmp_path))], catch_exceptions=False)
+    assert done.exit_code == 0
+    assert any(re.match(r"compiling: \d+ functions, \d+ s", line) for line in done.output.splitlines()), done.output
