@@ -14,7 +14,7 @@ import numpy as np
 
 from sweep.cli.families import described, main_outputs
 from sweep.evaluation.poses import evaluate
-from sweep.families.base import Family, March
+from sweep.families.base import Family, Interval, March
 from sweep.families.capabilities import Assembly
 from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag, parts, stem
@@ -22,12 +22,13 @@ from sweep.pages import TEMPLATES, rendered
 from sweep.quantities.units import read
 from sweep.study.toml import design_entries, toml
 
-# Units of the examples by unit word: those with forces or masses are in SI, the others in any length unit.
+# Units by unit word: examples with forces or masses are in SI, the others in any length unit.  Lengths are written in
+# mm, masses in g: the factor is that of an example in SI.
 SI = {
-    "length": "m", "1/length": "1/m", "mass": "kg", "line_mass": "kg/m", "inertia": "kg*m^2", "force": "N",
-    "torque": "N*m", "pressure": "N/m^2", "stiffness": "N/m", "damping": "N*s/m", "acceleration": "m/s^2",
+    "line_mass": "kg/m", "inertia": "kg*m^2", "force": "N", "torque": "N*m", "pressure": "N/m^2", "stiffness": "N/m",
+    "damping": "N*s/m", "acceleration": "m/s^2",
 }  # fmt: skip
-LENGTHS = {"length": "mm", "1/length": "1/mm"}
+WRITTEN = {"length": ("mm", 1e3), "1/length": ("1/mm", 1e-3), "mass": ("g", 1e3)}
 POWER = {"length": 1, "1/length": -1}
 OTHERS = {"speed": "rad/s", "angular_acceleration": "rad/s^2", "time": "s", "angle": "deg"}
 SPREAD, COUNT = 0.05, 5  # swept range on either side, relative to the example's value, and number of values
@@ -38,7 +39,14 @@ LEAST_SIZE = 20.0  # mm, least length of a member's longest dimension
 FIRST = (
     "swing", "stroke", "margin", "max_pressure_angle", "dwell_angle", "dwell_deviation", "stitch_error", "impact_speed",
 )  # fmt: skip
-GOALS = ("max_abs_d2", "impact_speed", "stroke")  # beginnings of outputs to be made small, the first wanted one
+# What a designer makes small in families without an acceleration: the error or the variation of a warp tension, the
+# load of a bracket, the turn of a thread around an edge.
+OWN_GOALS = {
+    "backrest": "max_abs_drift", "backrest_closure": "range_K_couple", "backrest_tension": "max_abs_N2_couple",
+    "free_cam_friction": "max_wrap",
+}  # fmt: skip
+# Beginnings of outputs to be made small, the first wanted one.
+GOALS = (*OWN_GOALS.values(), "max_abs_d2", "impact_speed", "stroke")
 FEWEST_WANTED, MOST_WANTED = 3, 5
 WIDTH = 56  # column of the explanations
 OFFSETS = 12  # angles tried between the crank of a later stage and the rocker before it, over the turn
@@ -76,6 +84,7 @@ def study_text(name: str, family: Family, schema: str, drawn: Mapping[str, float
             limits=limit_lines(family),
             goal=goal_of(wanted),
             march=isinstance(family.domain, March),
+            crank=not isinstance(family.domain, Interval),
             reference=drawn and toml({"reference": {"design": design_entries(family, drawn)}}),
         )
     )
@@ -155,15 +164,16 @@ def mechanism_line(family: Family) -> str:
 
 
 def wanted_outputs(family: Family) -> list[str]:
-    """Return the main outputs: size of the motion, pressure angle, largest acceleration; otherwise any outputs."""
+    """Return the main outputs: size of the motion, pressure angle, what is made small; otherwise any outputs."""
     # For a chain the outputs of the whole come first, then those of the stages.
     offered = sorted((name for name in main_outputs(family) if not is_flag(name)), key=lambda name: parts(name).stage)
     dwells = [name for name in offered if parts(name).stem.startswith("dwell_")]
     if dwells:  # a follower with full turns has no limit positions
         offered = dwells + [name for name in offered if parts(name).stem not in (*FIRST, "stroke_ratio")]
-    bends = [name for name in offered if name.startswith("max_abs_d2")][:1]
-    first = [name for name in offered if parts(name).stem in FIRST][: MOST_WANTED - len(bends)]
-    chosen = [*first, *bends]
+    goals = [name for name in offered if name.startswith("max_abs_d2")][:1]
+    goals += [OWN_GOALS[family.name]] if family.name in OWN_GOALS else []
+    first = [name for name in offered if parts(name).stem in FIRST][: MOST_WANTED - len(goals)]
+    chosen = [*first, *goals]
     return chosen + [name for name in offered if name not in chosen][: max(0, FEWEST_WANTED - len(chosen))]
 
 
@@ -211,12 +221,12 @@ def design_lines(family: Family, swept: list[str], drawn: Mapping[str, float] | 
     Values are those of a start, or of a design ``drawn`` [mm, rad].
     """
     example = start_of(family) if drawn is None else drawn
-    units = OTHERS | (SI if _in_si(family) else LENGTHS)
+    in_si = drawn is None and _in_si(family)
     for p in family.parameters:
         value = example.get(p.name, p.default)
         assert value is not None  # an example has every required parameter
-        unit = units.get(p.unit, "")
-        shown = math.degrees(value) if unit == "deg" else value
+        unit, factor = WRITTEN.get(p.unit, ((OTHERS | SI).get(p.unit, ""), 1.0))
+        shown = math.degrees(value) if unit == "deg" else value * factor if in_si else value
         if p.name in swept:
             ends = sorted((shown * (1.0 - SPREAD), shown * (1.0 + SPREAD)))
             more = f', unit = "{unit}"' if unit else ""

@@ -69,7 +69,9 @@ def init(
     if given > 1:
         raise InputError("--family, --member, --from-cyclogram", f"{given} of them", "one", "command line")
     if NAME.fullmatch(name) is None:
-        raise InputError("NAME", name, "a plain word of a-z, 0-9 and '-'", "command line")
+        plain = re.sub("[^a-z0-9]+", "-", name.lower()).strip("-")
+        hint = f", such as {plain}" if NAME.fullmatch(plain) else ""
+        raise InputError("NAME", name, f"a plain word of a-z, 0-9 and '-'{hint}", "command line")
     if points is not None and family is None:
         raise InputError("--points", str(points), "with --family: the points of one mechanism", "command line")
     if cyclogram is not None:

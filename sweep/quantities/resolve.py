@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from sweep.effects import elsewhere, extended, offered
 from sweep.errors import InputError, listed, nearest
+from sweep.families import NAMES
+from sweep.families import family as find_family
 from sweep.families.base import Event, Family, Interval, Output, Turn
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import Chain, own_outputs
@@ -295,11 +297,21 @@ def _known(family: Family, name: str) -> str:
     of_effects = [o.name for o in offered(family)]
     near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])
     if name in family.pose_names:
-        near = f"; {name} is one of a single pose, ask `evaluate`"
+        extremes = ", ".join(f"{prefix}{name}" for prefix in grammar if not prefix.startswith(f"{family.domain.name}_"))
+        near = f"; {name} is one of a single pose, ask `evaluate`, or for one of {extremes}"
     if name in family.parameter_names:
         near = f"; {name} is a parameter: a dataset has it, and keep= repeats it in a result"
     if name in BOXES and isinstance(family, Chain):
         near = f"; {name} is one of a stage, as {name}1; of a machine there is one of all its members"
     if of_effects:
         words += ", and those of effects (sweep effects)"
-    return words + (elsewhere(family, name) or near)
+    return words + (elsewhere(family, name) or _of_families(name) + near)
+
+
+def _of_families(name: str) -> str:
+    """Say which families have a design output of their own that another one does not know."""
+    others = [
+        other for other in map(find_family, NAMES) if any(o.name == name for step in other.steps for o in step.provides)
+        or any(name in limit_names(other, position, stage) for position, stage in other.positions.items())
+    ]  # fmt: skip
+    return f"; {name} is one of {listed(other.name for other in others)}" if others else ""

@@ -16,7 +16,7 @@ from pydantic import Field
 from sweep.effects import all_inputs, curved_inputs, extended, input_names
 from sweep.effects.base import STUDY_LOADS
 from sweep.effects.wanted import expanded, names_of_effects
-from sweep.errors import InputError, choices, closest
+from sweep.errors import InputError, choices, closest, reason
 from sweep.evaluation.loads import UNITS, rod
 from sweep.families.base import Family
 from sweep.families.machines.machine import Machine
@@ -78,7 +78,8 @@ def read_inputs(file: StudyFile, bare: Family) -> Inputs:
         for name, entry in _with_rods(entries, file.faults).items() if table == "bodies" else entries.items():
             key: Key = (table, name)
             if tables.get(name) != table:
-                _misplaced(bare, key, entry, tables, file.faults)
+                owners = {x: owner for x, owner in tables.items() if x == name or x not in entries}
+                _misplaced(bare, key, entry, owners, file.faults)
             elif name in design:
                 file.faults.value(key, entry, "either here or in [design]")
             elif table == "loads" and is_curve(entry):
@@ -151,10 +152,12 @@ def _misplaced(bare: Family, key: Key, entry: object, owners: dict[str, str], fa
         owner = {"design": "[scene] or [design]"}.get(owners[name], f"[{owners[name]}]")
         faults.value(key, entry, f"nothing here: it stands in {owner}")
     else:
-        names = sorted(name for name, owner in owners.items() if owner == table)
-        guess = closest(name, names)  # the inputs of a chain are hundreds
-        names = names if guess is None else [guess]
-        faults.unknown(key, names, f"input of the effects of {bare.name}")
+        # The inputs of a chain are hundreds: those that begin alike, such as the masses, are meant first.
+        known = sorted(name for name, owner in owners.items() if owner == table)
+        alike = [other for other in known if other.partition("_")[0] == name.partition("_")[0]]
+        guess = closest(name, alike) or closest(name, known)
+        names = alike if guess is None or guess in alike else [*alike, guess]
+        faults.unknown(key, names or known, f"input of the effects of {bare.name}")
 
 
 def _read_load(file: StudyFile, bare: Family, inputs: Inputs, name: str, entry: dict[str, Any]) -> None:
@@ -235,7 +238,8 @@ def _file(
     try:
         table = pd.read_csv(path) if path.suffix == ".csv" else pd.read_parquet(path)
     except (OSError, ValueError) as error:
-        faults.value(place, name, f"a table that can be read: {str(error).splitlines()[0]}")
+        words = reason(error) if isinstance(error, OSError) else str(error).splitlines()[0]
+        faults.value(place, name, f"a table that can be read: {words}")
         return None
     columns = [str(column) for column in table.columns]
     for k, column in enumerate(section.columns or ()):

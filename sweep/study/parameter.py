@@ -67,7 +67,7 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
     internal = units.internal_unit(p.unit)
     if isinstance(raw, str) and internal != "1":
         value = faults.number(raw, internal, key)
-        return None if value is None else _checked(p, units.split(raw, internal)[0], value, key, faults)
+        return None if value is None else _checked(p, *units.split(raw, internal), value, key, faults)
     if isinstance(raw, list):
         faults.value(key, raw, f"{{ values = [...]{_unit_form(p)} }}")
         return None
@@ -85,7 +85,7 @@ def _read_fixed(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) 
     unit = _unit(p, entry.unit, raw, key, faults)
     if entry.value is None or unit is None:
         return None
-    return _checked(p, entry.value, entry.value * unit[1], key, faults)
+    return _checked(p, entry.value, unit[0], entry.value * unit[1], key, faults)
 
 
 def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -> Axis | None:
@@ -95,7 +95,7 @@ def _read_list(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults) -
         return None
     seen: set[float] = set()
     for k, value in enumerate(entry.values):
-        _checked(p, value, value, (*key, "values", k), faults)
+        _checked(p, value, entry.unit, value, (*key, "values", k), faults)
         if value in seen:
             faults.value((*key, "values", k), value, "every value once")
         seen.add(value)
@@ -117,11 +117,13 @@ def _read_range(p: Parameter, raw: Mapping[str, Any], key: Key, faults: Faults, 
     if not sampled and "count" not in raw:
         faults.missing((*key, "count"), "a whole number of values, 1 or greater (or design.sample)")
     if low is not None:
-        _checked(p, low, low, (*key, "from"), faults)
+        _checked(p, low, entry.unit, low, (*key, "from"), faults)
         if entry.scale == "log" and low <= 0.0:
             faults.value((*key, "from"), low, 'a positive number on a scale = "log"')
     if low is not None and high is not None and not low < high:
         faults.value((*key, "to"), high, f"a number greater than from = {low:g}")
+    elif high is not None:
+        _checked(p, high, entry.unit, high, (*key, "to"), faults)
     if len(faults.lines) > before or low is None or high is None or unit is None:
         return None
     if sampled:
@@ -141,7 +143,9 @@ def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faul
     return None if factor is None else (unit, factor)
 
 
-def _checked(p: Parameter, written: float, value: float, key: Key, faults: Faults) -> float:
+def _checked(p: Parameter, written: float, unit: str | None, value: float, key: Key, faults: Faults) -> float:
+    if unit == "rad" and abs(written) > 2.0 * math.pi:
+        faults.value(key, written, f'an angle within one turn if the unit is rad; {written:g} with the unit "deg"?')
     if p.sign and (math.isnan(value) or p.wrong_sign(value)):
         faults.value(key, written, f"a {p.sign} {p.unit} ({p.text})")
     if p.choices is not None and value not in p.choices:
@@ -151,7 +155,7 @@ def _checked(p: Parameter, written: float, value: float, key: Key, faults: Fault
 
 def _usual(internal: str) -> str:
     """Return the unit that designers write for an internal unit."""
-    return {"rad": "deg", "t": "kg", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
+    return {"rad": "deg", "t": "g", "t*mm^2": "kg*mm^2", "rad/s": "rpm", "N*mm*s": "N*m/rpm"}.get(internal, internal)
 
 
 def forms(p: Parameter, number: object = None) -> str:

@@ -115,6 +115,13 @@ def test_first_study_of_a_presser_foot_is_of_its_size_and_asks_for_soft_impacts(
     assert study.objective.output == "impact_speed"
 
 
+@pytest.mark.parametrize("family", [*NAMES, *CHAINS])
+def test_first_study_makes_small_what_a_designer_would(family, tmp_path):
+    """A stroke is what a mechanism is for: made small, the best design does not move."""
+    study = load_study(written(tmp_path, family))
+    assert parts(study.objective.output).stem not in ("stroke", "swing", "size")
+
+
 @pytest.mark.parametrize("members", mostly_long([
     ("needle=rssr+guide", "looper=rssr"),
     ("cam=cam", "bar=slider_crank"),

@@ -9,9 +9,10 @@ import pandas as pd
 import pytest
 
 from sweep.cli.tables import write_table
-from sweep.errors import StoreError, closest
+from sweep.errors import StoreError, StudyError, closest
 from sweep.families import NAMES
 from sweep.quantities.units import SYMBOLS, UnitFault, factor
+from sweep.study import load_study
 
 OUTPUTS = [
     "psi", "eps_y", "dpsi", "d2psi", "swing", "margin", "max_abs_d2psi", "max_crank_acceleration", "max_pressure_angle",
@@ -61,6 +62,47 @@ def test_hint_about_a_unit_is_one_that_may_stand_there(unit: str, internal: str,
     with pytest.raises(UnitFault) as fault:
         factor(unit, internal)
     assert str(fault.value).endswith(hint)
+
+
+CRANK_ROCKER = """[study]
+name = "hints"
+[mechanism]
+family = "rssr"
+[scene]
+want = ["kinetostatics"]
+[design]
+a = "10 mm"
+b = "36 mm"
+c = "26 mm"
+e = "40 mm"
+f = "6 mm"
+g = "-4 mm"
+alpha = "40 deg"
+[bodies]
+m_coupler = "20 g"
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "behind", "said"),
+    [
+        ('"40 deg"', '"40 rad"', 'design.alpha = 40.0; allowed: an angle within one turn if the unit is rad; 40 with'),
+        ('"40 deg"', '{ value = -40, unit = "rad" }', "design.alpha = -40.0; allowed: an angle within one turn"),
+        ('"40 deg"', '{ values = [1, 7], unit = "rad" }', "design.alpha.values[1] = 7.0; allowed: an angle within"),
+        ('"40 deg"', '{ from = 0, to = 90, count = 2, unit = "rad" }', "design.alpha.to = 90.0; allowed: an angle"),
+        # Both what was written and what is still missing are named.
+        ("m_coupler", "m_arm", "m_arm: unknown input of the effects of rssr; allowed: m_coupler, m_crank, m_rocker"),
+        ("m_coupler", "m_arm", 'm_coupler is missing; needed: mass of the coupler; for kinetostatics: a mass with its'
+                               ' unit, as "40.0 g"'),
+        ('"kinetostatics"', '"stroke"', "; stroke is one of rssp, guide, swivel, slider_crank, "),
+        ('"kinetostatics"', '"psi"', "ask `evaluate`, or for one of max_abs_psi, max_psi, min_psi, range_psi, rms_psi"),
+    ],
+)  # fmt: skip
+def test_a_message_leads_to_what_is_meant(before: str, behind: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(CRANK_ROCKER.replace(before, behind), encoding="utf-8")
+    with pytest.raises(StudyError) as fault:
+        load_study(tmp_path)
+    assert said in str(fault.value)
 
 
 def test_a_disk_that_can_only_be_read_is_an_error_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
