@@ -109,10 +109,10 @@ bench: $(VENV)/dev  ## ns per sample against numpy and C; what everything takes,
 	$(BIN)/python -m tests.bench.kernels
 	$(BIN)/python -m tests.bench.chains
 	$(BIN)/python -m tests.bench.costs
-	$(SWEEP) effects --markdown > docs/effects.md
+	$(BIN)/python docs/effects_page.py
 
 docs: $(VENV)/dev  ## make docs/effects.md and docs/study.schema.json from the register
-	$(SWEEP) effects --markdown > docs/effects.md
+	$(BIN)/python docs/effects_page.py
 	$(SWEEP) schema > docs/study.schema.json
 
 site: $(VENV)/dev  ## the docs as a site, into build/site; no network

@@ -10,9 +10,10 @@ import pytest
 from click.testing import CliRunner
 
 import sweep
+from docs.effects_page import grouped, of_any_place, page, parts, places_of
 from studies.accuracy.ordinary import designs
 from sweep.cli import main
-from sweep.cli.effects import every_input, grouped, of_any_place, page, parts, places_of
+from sweep.cli.effects import every_input
 from sweep.effects import NAMES, applicable, effect, extended, offered
 from sweep.effects.advice import closure, findings, left_out, tree
 from sweep.effects.base import PlacedEffect
