@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,10 +24,8 @@ from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns, Work
 from sweep.families.names import error_of, parts
 from sweep.quantities.limits import Limit, meets
+from sweep.study import Study
 from sweep.synthesis.fit import driving_outputs, fit_line
-
-if TYPE_CHECKING:
-    from sweep.study import Study
 
 # Largest batch of a route, so that its tables stay in the caches; a costly route gets at most what it computes in
 # BATCH_SECONDS, so that a stop is noticed in between.

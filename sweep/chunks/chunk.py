@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +16,8 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array, Columns
 from sweep.families.names import error_of, is_flag
 from sweep.reductions.steps import is_proven
+from sweep.study import Study
 from sweep.synthesis.fit import fit_line
-
-if TYPE_CHECKING:
-    from sweep.study import Study
 
 
 @dataclass(frozen=True)

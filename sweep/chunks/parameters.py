@@ -8,7 +8,6 @@ surviving designs.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,7 @@ from sweep.costs import nanoseconds
 from sweep.errors import InputError
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Array
-
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.study import Study
 
 
 def parameter_matrix(study: Study, start: int, stop: int) -> tuple[Array, NDArray[np.uint8]]:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 
@@ -24,9 +24,7 @@ from sweep.quantities.resolve import resolve
 from sweep.quantities.units import internal_unit
 from sweep.reductions.steps import is_proven
 from sweep.sources import DIGESTS
-
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.study import Study
 
 FORMAT = 2
 

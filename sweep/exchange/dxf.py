@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from sweep.errors import InputError, extra
+from sweep.evaluation.joints import Part
 from sweep.exchange.scene import PlacedPart, extent, frames_of, shown_name
 from sweep.families.base import Array
-
-if TYPE_CHECKING:
-    from sweep.evaluation.joints import Part
 
 LAYERS = {"LINKS": 5, "JOINTS": 7, "PIVOTS": 1, "AXES": 8, "PATHS": 3, "TEXT": 7}
 # Axes to the right and upwards: the side is seen from the left, the top from above, with z pointing down.

@@ -15,12 +15,12 @@ from sweep.dataset import files
 from sweep.dataset.comparison import LEAST_SECONDS, ROWS_CHANGED, SLOWER, VALUES_CHANGED, compare
 from sweep.dataset.reading import best
 from sweep.engine.opening import differences
+from sweep.nights.archive import NightRecord
+from sweep.study import Study
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.nights.archive import NightRecord
-    from sweep.study import Study
 
 # Tolerance of a study that samples its extrema, without an accuracy: rounding may differ between versions.
 ROUNDING = {"float64": 1e-12, "float32": 1e-6}

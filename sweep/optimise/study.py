@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -33,9 +33,7 @@ from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.posing import problem_and_starts, problem_of, problem_of_dataset
 from sweep.optimise.starts.proportions import insensitive
-
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.study import Study
 
 TEXTS = {
     "role": (

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
+from sweep.evaluation.joints import Part
 from sweep.exchange.scene import VIEWS, extent, first_pose, frames_of, is_spatial, projection, shown_name
 from sweep.families.base import Array
 from sweep.report.figures import OPTIMUM, QUIET, WIDTH, new_figure
@@ -16,8 +17,6 @@ from sweep.report.figures import OPTIMUM, QUIET, WIDTH, new_figure
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from sweep.evaluation.joints import Part
 
 
 def mechanism_figure(parts: Sequence[Part], unit: str, view: str | None = None, positions: int = 1) -> Figure:

@@ -12,6 +12,7 @@ import numpy as np
 
 from sweep.dataset.files import unwritable
 from sweep.errors import InputError
+from sweep.evaluation.joints import Part
 from sweep.exchange.dxf import add_tables
 from sweep.exchange.export import export
 from sweep.exchange.scene import exists, finite, frames_of, is_spatial, over, pose, shown_name
@@ -25,7 +26,6 @@ from sweep.report.tables import limit_states, parameter_rows, value_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sweep.evaluation.joints import Part
 
 A3 = (16.54, 11.69)  # inches, landscape
 VIEWS_HIGH, TABLES_HIGH = 5.7, 6.0  # inches, of the views and of each row of tables; the sheet grows with the rows

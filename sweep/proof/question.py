@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from sweep.families.capabilities import ProvableLocus
 from sweep.families.chain import Chain
 from sweep.optimise.multistart.multistart import listed
 from sweep.quantities.limits import Limit, meets, tightest
-
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.study import Study
 
 MOST_FREE = 4
 HUGE = 1e9  # not an acceleration: a larger target stands for none

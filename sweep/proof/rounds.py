@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,7 @@ from sweep.families.base import Array
 from sweep.jobs.executors import Executor
 from sweep.jobs.signals import Stop
 from sweep.proof.question import Question
-
-if TYPE_CHECKING:
-    from sweep.study import ProveSettings
+from sweep.study import ProveSettings
 
 UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # shares of all boxes by round: later rounds have better bounds for choosing boxes

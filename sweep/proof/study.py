@@ -8,7 +8,6 @@ import math
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,7 @@ from sweep.errors import MissingInput
 from sweep.proof.certificate import Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of
 from sweep.proof.rounds import SHARES, UNITS, Cores, Tell, explored
-
-if TYPE_CHECKING:
-    from sweep.study import ProveSettings, Study
+from sweep.study import ProveSettings, Study
 
 NEVER = 1e300  # target without a known feasible design: then only emptiness can be proven
 PARTS = "_proof"  # folder of finished work units; removed when the proof has ended

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from kernels import status as codes
 from sweep.dataset import files
@@ -12,13 +11,14 @@ from sweep.errors import how_many
 from sweep.evaluation.statuses import meaning
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.start import DIFFERS
-from sweep.optimise.multistart.survey import optima_words
+from sweep.optimise.multistart.survey import Survey, optima_words
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset
 from sweep.report.front import Front
 from sweep.report.quantities import ShownQuantity, change, number, quantity, rpm
+from sweep.report.scan import Scan
 from sweep.report.tables import (
     ACTIVE,
     LimitState,
@@ -29,11 +29,6 @@ from sweep.report.tables import (
     parameter_rows,
     value_of,
 )
-
-if TYPE_CHECKING:
-    from sweep.optimise.multistart.survey import Survey
-    from sweep.report.scan import Scan
-
 
 MISSED = ("missed", "unknown")
 NEAREST = 4  # inactive limits named in the answer; the table has them all

@@ -25,12 +25,11 @@ from sweep.quantities.kinds import is_windowed
 from sweep.quantities.resolve import find
 from sweep.report.quantities import ShownQuantity, quantity
 from sweep.report.scan import Cells, Scan, divided_axes, scan
+from sweep.study import Study
 from sweep.study.load import study_of
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.study import Study
 
 
 Row = Mapping[str, Any]

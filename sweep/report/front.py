@@ -17,11 +17,11 @@ from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, records
 from sweep.report.figures import LIMIT, OPTIMUM
 from sweep.report.quantities import ShownQuantity, change, number
+from sweep.study import ParetoSettings
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from sweep.study import ParetoSettings
 
 EDGES = (" at its lower bound", " at its upper bound")
 

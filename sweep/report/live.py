@@ -10,7 +10,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,16 +24,12 @@ from sweep.exchange.scene import PlacedPart, extent, is_spatial, shown_name, sid
 from sweep.families.base import Angles, Array, Family, Interval, equal_steps
 from sweep.families.names import is_flag, is_largest, reduced, stem
 from sweep.quantities.limits import compared
-from sweep.report.optima import shown_designs
+from sweep.report.dataset import Dataset
+from sweep.report.optima import DistinctOptimum, Shown, shown_designs
 from sweep.report.quantities import ShownQuantity, quantity
+from sweep.report.scan import Cells
 from sweep.report.tables import limited
-
-if TYPE_CHECKING:
-    from sweep.report.dataset import Dataset
-    from sweep.report.optima import DistinctOptimum, Shown
-    from sweep.report.scan import Cells
-    from sweep.study import Limit
-
+from sweep.study import Limit
 
 SPATIAL, PLANE = ("live/three.min.js", "live/view.js"), ("live/charts.js", "live/lines.js", "live/page.js")
 

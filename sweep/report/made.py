@@ -13,6 +13,7 @@ import numpy as np
 from sweep.dataset import files
 from sweep.evaluation.cyclogram import event_angles
 from sweep.evaluation.summaries import design_outputs
+from sweep.families.base import Array
 from sweep.families.names import is_flag, without_minus
 from sweep.optimise.manufacture.tolerance import (
     TELLING_GAIN,
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from sweep.families.base import Array
 
 NOWHERE = (math.nan, math.nan)
 BINS = 41

@@ -9,20 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweep.families.base import Array
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, marked
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
 from sweep.report.front import Front
 from sweep.report.quantities import ShownQuantity
-from sweep.report.scan import Cells, Scan, most_telling
+from sweep.report.scan import Cells, Grid, Scan, most_telling
+from sweep.study import Study
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-    from sweep.families.base import Array
-    from sweep.report.scan import Grid
-    from sweep.study import Study
 
 
 MARKS: dict[str, dict[str, Any]] = {

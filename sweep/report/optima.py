@@ -16,6 +16,7 @@ import numpy as np
 from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
 from sweep.exchange.scene import extent
+from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared, meets
@@ -27,8 +28,6 @@ from sweep.report.tables import parameter_rows
 
 if TYPE_CHECKING:
     from markupsafe import Markup
-
-    from sweep.families.base import Array
 
 
 ALIKE = 0.1  # share of the mechanism's size, or of half a turn, below which designs count as the same

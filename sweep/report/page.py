@@ -36,11 +36,10 @@ from sweep.report.quantities import number, rpm
 from sweep.report.scan import Cells, Scan, most_telling
 from sweep.report.sewing import diagram_of_dataset, sewn, threads_figure
 from sweep.report.sketch import bars, dimensioned, drawn_parts, sketch
+from sweep.study import Study
 
 if TYPE_CHECKING:
     from markupsafe import Markup
-
-    from sweep.study import Study
 
 
 COMPARISON = "comparison.html"

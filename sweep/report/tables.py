@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,14 +14,10 @@ from sweep.evaluation.statuses import meaning
 from sweep.families.names import error_of, is_flag, is_place, without_minus
 from sweep.optimise.local.descent import KKT
 from sweep.quantities.limits import compared, meets
-from sweep.report.dataset import Row
+from sweep.report.dataset import Dataset, Row
 from sweep.report.quantities import ShownQuantity, change, number, quantity
-
-if TYPE_CHECKING:
-    from sweep.report.dataset import Dataset
-    from sweep.report.scan import Scan
-    from sweep.study import Limit, Study
-
+from sweep.report.scan import Scan
+from sweep.study import Limit, Study
 
 ACTIVE = 1e-5  # distance of the optimum from a limit, relative to its size, below which the limit is active
 

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,10 +27,8 @@ from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, share_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.tables import bound_words, limit_states, limited
+from sweep.study import Limit, Study
 from sweep.synthesis.fit import fit_line
-
-if TYPE_CHECKING:
-    from sweep.study import Limit, Study
 
 OK, INFEASIBLE = 0, 4
 TURN = np.arange(360, dtype=np.float64) * (2.0 * math.pi / 360)

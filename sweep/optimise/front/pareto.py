@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,11 +17,7 @@ from sweep.optimise.multistart.multistart import minimise
 from sweep.optimise.multistart.survey import CUT
 from sweep.optimise.problem.statement import PLACE, Problem
 from sweep.quantities.limits import compared
-from sweep.study import Limit, OptimiseSettings
-
-if TYPE_CHECKING:
-    from sweep.study import ParetoSettings
-
+from sweep.study import Limit, OptimiseSettings, ParetoSettings
 
 LEAST_WIDTH = 1.0 / 256.0  # share of the range of bounds: a narrower gap is a jump of the front, which no point fills
 LEAST_AREA = 1e-4  # share of the square around the front: a smaller triangle is no gap

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,14 +21,12 @@ from sweep.families.names import by_magnitude
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.front.pareto import FrontSearch, advance
 from sweep.optimise.multistart.kept import noted, result_of
+from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.populations import diverse
 from sweep.optimise.starts.posing import problem_of_dataset
 from sweep.optimise.study import certificates, outputs, write
 from sweep.quantities.units import internal_unit
-
-if TYPE_CHECKING:
-    from sweep.optimise.problem.statement import Problem
-    from sweep.study import ParetoSettings, Study
+from sweep.study import ParetoSettings, Study
 
 KEPT = 2048  # best rows of the dataset within each bound from which starts are chosen
 KEY, STATE = b"key", b"state"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,9 +22,7 @@ from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, toleranc
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import meets
-
-if TYPE_CHECKING:
-    from sweep.study import Limit, Tolerance
+from sweep.study import Limit, Tolerance
 
 SHIFTS = (0.2, 0.1, 0.05)  # steps of the compass search [standard deviations]; finer ones follow the sample's noise
 MAX_ROUNDS = 100  # largest number of rounds of each step

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from statistics import NormalDist
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,9 +34,7 @@ from sweep.optimise.multistart.survey import CUT
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import compared, meets
-
-if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings, Tolerance
+from sweep.study import OptimiseSettings, Tolerance
 
 SAME = 1e-8  # relative difference of two optima that count as equally good
 VIOLATION_WAYS = 4.0  # assumed number of nearly independent ways to violate the limits, for the first margins

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +21,7 @@ from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import Limit, compared, meets
 from sweep.quantities.measures import Measure, measure
 from sweep.quantities.resolve import output as described
-
-if TYPE_CHECKING:
-    from sweep.study import Study, Tolerance
+from sweep.study import Study, Tolerance
 
 TIE = 1e-6  # relative difference below which extrema count as equal to the largest one
 DIMENSIONS = ("length", "angle", "ratio")  # with a tolerance; ratios are dimensions of a geared drive in planet radii

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from itertools import chain
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +35,7 @@ from sweep.optimise.problem.on_locus import on_locus
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import PLACE, Problem
 from sweep.optimise.starts.ranked import samples
-
-if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings, Study
+from sweep.study import OptimiseSettings, Study
 
 CHECKED_STARTS = 3  # number of starts at which equations are checked for dependency
 SERIAL_EVALUATIONS = 800  # evaluations, about a second, after which a search is worth several processes

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from sweep.errors import how_many
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE, Result
 from sweep.optimise.problem.statement import Problem
-
-if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings
+from sweep.study import OptimiseSettings
 
 GROUP_SIZE = 6  # starts searched between two checks of the stopping rule
 CONFIRMATIONS = 3  # distinct starts that have to end in the best basin

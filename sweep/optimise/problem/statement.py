@@ -11,11 +11,11 @@ import numpy as np
 
 from sweep.errors import InputError, MissingInput, choices
 from sweep.families.base import Accuracy, Array, Family, March
+from sweep.study import Limit
 
 if TYPE_CHECKING:
     from sweep.optimise.manufacture.curve_margins import Allowance, CurveMargin
     from sweep.optimise.problem.on_locus import LocusCoordinates
-    from sweep.study import Limit
 
 PLACE = "optimisation problem"
 

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,11 +19,9 @@ from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.populations import diverse
 from sweep.optimise.starts.ranked import ALIKE, RANKED, ranking, samples
 from sweep.quantities.limits import compared
+from sweep.study import Study
 from sweep.synthesis.fit import fit_line
 from sweep.synthesis.tasks import solve
-
-if TYPE_CHECKING:
-    from sweep.study import Study
 
 KEPT = 100_000  # best rows of a dataset that are candidates
 SCREENED = 256  # designs of a study's space drawn per start if its dataset has no feasible row

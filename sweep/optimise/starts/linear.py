@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import NormalDist
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,9 +24,7 @@ from sweep.families.capabilities import GuidedPoint
 from sweep.families.chain import driven_guide
 from sweep.optimise.manufacture.tolerance import SIGMAS, tolerances_of
 from sweep.optimise.problem.statement import Problem
-
-if TYPE_CHECKING:
-    from sweep.study import Tolerance
+from sweep.study import Tolerance
 
 POSES = 64  # poses per turn in the linear program
 SMALLEST = 1e-9  # smallest scale of a guide

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +17,7 @@ from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import best_rows, random_designs, swept_and_sampled
 from sweep.optimise.starts.proportions import descend_once, enclosing, from_populations
 from sweep.quantities.limits import Limit, tightest
-
-if TYPE_CHECKING:
-    from sweep.study import Study
+from sweep.study import Study
 
 WHOLE_TURN = 2.0 * np.pi - 1e-9
 SHORTEST = 0.02  # lower bound of a length without a lower limit, relative to its upper limit

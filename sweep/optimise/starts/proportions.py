@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,9 +35,7 @@ from sweep.optimise.starts.populations import (
 )  # fmt: skip
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.ranked import ALIKE
-
-if TYPE_CHECKING:
-    from sweep.study import OptimiseSettings, Study, Tolerance
+from sweep.study import OptimiseSettings, Study, Tolerance
 
 SWEPT = 6  # one of this many starts comes from the sweep, beside populations
 POPULATIONS, ENDS = 3, 4  # populations with margins for tolerances, and their ends that start the robust search
