@@ -21,11 +21,12 @@ from sweep.dataset.store import is_complete
 from sweep.engine.run import run
 from sweep.errors import Interrupted, StudyError
 from sweep.optimise import front_study
-from sweep.optimise.front.study import best_within, saved
+from sweep.optimise.front.study import saved
+from sweep.optimise.starts.dataset import best_rows
 from sweep.report.dataset import read_dataset
 from sweep.report.front import Front
 from sweep.report.page import write_report
-from sweep.study import ParetoSettings, Study, load_study
+from sweep.study import Limit, ParetoSettings, Study, load_study
 from tests.optimise.test_study import STUDY
 
 TABLE = """
@@ -166,12 +167,16 @@ def test_starts_lie_within_their_bound(whole: tuple[Study, Path]) -> None:
     study, folder = whole
     rows = pd.concat(pd.read_parquet(path) for path in sorted(folder.glob("part-*")))
     assert study.pareto is not None
-    for bound in (0.6, 0.8):
-        ((designs, merit),) = best_within(study, study.pareto, (bound,), folder)
+    bounds = (0.6, 0.8)
+    limits = [*(Limit("max_pressure_angle", None, bound) for bound in bounds), Limit("max_pressure_angle", 0.8, None)]
+    *below, (above, _) = best_rows(study.family, "max_abs_d2psi", folder, limits)
+    for bound, (designs, merit) in zip(bounds, below, strict=True):
         inside = rows[rows["max_pressure_angle"] <= bound]
         assert len(designs) == len(inside) and merit.min() == inside["max_abs_d2psi"].min()
-    ((designs, _),) = best_within(study, replace(study.pareto, at_least=True), (0.8,), folder)
-    assert len(designs) == (rows["max_pressure_angle"] >= 0.8).sum()
+    assert len(above) == (rows["max_pressure_angle"] >= 0.8).sum()
+    ((few, merit),) = best_rows(study.family, "max_abs_d2psi", folder, limits[1:2], 3)
+    within = rows.loc[rows["max_pressure_angle"] <= bounds[1], "max_abs_d2psi"]
+    assert len(few) == 3 and merit.max() == within.nsmallest(3).max()
 
 
 def test_report_shows_the_front(whole: tuple[Study, Path], tmp_path: Path) -> None:

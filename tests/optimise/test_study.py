@@ -126,12 +126,12 @@ def test_same_dataset_gives_the_same_bytes(dataset):
 
 def test_best_rows_are_the_feasible_ones(dataset):
     study, folder = dataset
-    designs, merit = best_rows(study.family, "max_abs_d2psi", folder)
+    ((designs, merit),) = best_rows(study.family, "max_abs_d2psi", folder)
     rows = pd.read_parquet(folder)
     assert len(designs) == len(rows) and merit.min() == rows.max_abs_d2psi.min()
     assert problem_of(study, designs).variables == ("a", "b", "c", "alpha")
     # the sign of a swing is that of its branch; what is small is its magnitude
-    _, merit = best_rows(study.family, "swing", folder)
+    ((_, merit),) = best_rows(study.family, "swing", folder)
     assert merit.min() == rows.swing.abs().min()
 
 

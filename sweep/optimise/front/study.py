@@ -11,22 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from kernels import status as st
-from sweep.dataset import chunk_files, files
+from sweep.dataset import files
 from sweep.dataset.files import metadata
 from sweep.errors import MissingInput, SearchCutShort
 from sweep.evaluation.summaries import output
 from sweep.families.base import Array
-from sweep.families.names import by_magnitude
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.front.pareto import FrontSearch, advance
 from sweep.optimise.multistart.kept import noted, result_of
 from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.dataset import best_rows
 from sweep.optimise.starts.populations import diverse
 from sweep.optimise.starts.posing import problem_of_dataset
 from sweep.optimise.study import certificates, outputs, write
 from sweep.quantities.units import internal_unit
-from sweep.study import ParetoSettings, Study
+from sweep.study import Limit, ParetoSettings, Study
 
 KEPT = 2048  # best rows of the dataset within each bound from which starts are chosen
 KEY, STATE = b"key", b"state"
@@ -138,9 +137,8 @@ def _write(
 
 def _search_ends(study: Study, folder: Path) -> tuple[Array, Array]:
     """Return the designs at which the search for the optimum ended, (k, P), and the optimum (1, P)."""
-    names = list(study.family.parameter_names)
-    rows = _columns(files.beside(folder) / files.OPTIMUM, [*names, "role"])
-    designs = np.column_stack([rows[name] for name in names]).astype(np.float64)
+    rows = files.read_table(files.beside(folder) / files.OPTIMUM)
+    designs = rows[list(study.family.parameter_names)].to_numpy(np.float64)
     return designs[rows["role"] != "reference"], designs[rows["role"] == "optimum"]
 
 
@@ -149,39 +147,11 @@ def _starts(study: Study, settings: ParetoSettings, problem: Problem, folder: Pa
 
     These are ``optimum`` and diverse good designs of the dataset within the bound.
     """
+    assert study.objective is not None
+    bounds = FrontSearch.of(settings).bounds
+    limits = [Limit(settings.output, *((b, None) if settings.at_least else (None, b))) for b in bounds]
     chosen = []
-    for designs, merit in best_within(study, settings, FrontSearch.of(settings).bounds, folder):
+    for designs, merit in best_rows(study.family, study.objective.output, folder, limits, KEPT):
         good = diverse(problem, designs, merit, settings.starts) if settings.starts else designs[:0]
         chosen.append(np.concatenate([optimum, good]))
     return chosen
-
-
-def best_within(
-    study: Study, settings: ParetoSettings, bounds: tuple[float, ...], folder: Path
-) -> list[tuple[Array, Array]]:
-    """Return the best feasible designs (k, P) of a dataset within each bound, k up to 2048, with their objectives."""
-    assert study.objective is not None
-    names = study.family.parameter_names
-    best = [(np.empty((0, len(names))), np.empty(0)) for _ in bounds]
-    for part in chunk_files.parts(folder):
-        columns = _columns(part.path, [*names, study.objective.output, settings.output, "status"])
-        designs = np.column_stack([columns[name] for name in names]).astype(np.float64)
-        objective = columns[study.objective.output].astype(np.float64)
-        output = columns[settings.output].astype(np.float64)
-        magnitude = np.abs(output) if by_magnitude(settings.output) else output
-        feasible = (columns["status"] == st.OK) & np.isfinite(objective)
-        for k, bound in enumerate(bounds):
-            inside = feasible & (magnitude >= bound if settings.at_least else magnitude <= bound)
-            joined, values = (
-                np.concatenate(pair) for pair in zip(best[k], (designs[inside], objective[inside]), strict=True)
-            )
-            order = np.sort(np.argsort(values, kind="stable")[:KEPT])
-            best[k] = joined[order], values[order]
-    return best
-
-
-def _columns(path: Path, names: list[str]) -> dict[str, Any]:
-    import pyarrow.parquet as pq
-
-    table = pq.read_table(path, columns=list(dict.fromkeys(names)), use_threads=False)
-    return {name: table[name].to_numpy() for name in table.column_names}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup, in_groups
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.populations import diverse
 from sweep.optimise.starts.ranked import ALIKE, RANKED, ranking, samples
-from sweep.quantities.limits import compared
+from sweep.quantities.limits import Limit, compared, meets
 from sweep.study import Study
 from sweep.synthesis.fit import fit_line
 from sweep.synthesis.tasks import solve
@@ -28,22 +28,27 @@ SCREENED = 256  # designs of a study's space drawn per start if its dataset has 
 TASK_SAMPLES = 4  # samples for a [task], whose mechanisms serve as starts only
 
 
-def best_rows(family: Family, objective: str, folder: Path) -> tuple[Array, Array]:
-    """Return the best feasible designs of a dataset (k, P), k up to 10^5, and their compared objective.
+def best_rows(
+    family: Family, objective: str, folder: Path, limits: Sequence[Limit | None] = (None,), most: int = KEPT
+) -> list[tuple[Array, Array]]:
+    """Return the best feasible designs (k, P) of a dataset within each limit, with their compared objective.
 
-    Only the parameters, the objective and the status are read, batch by batch.
+    There are at most ``most`` for each, in the order of the dataset.  Only the parameters, the objective, the limited
+    outputs and the status are read, batch by batch; for None no further limit holds.
     """
     names = family.parameter_names
-    designs, merit = np.empty((0, len(names))), np.empty(0)
-    for batch in batches((part.path for part in parts(folder)), [*names, objective, "status"]):
-        feasible = np.asarray(batch["status"]) == st.OK
-        new = np.column_stack([np.asarray(batch[name], np.float64) for name in names])[feasible]
-        designs = np.concatenate([designs, new])
-        merit = np.concatenate([merit, compared(objective, np.asarray(batch[objective], np.float64)[feasible])])
-        if len(merit) > KEPT:
-            best = np.sort(np.argsort(merit, kind="stable")[:KEPT])
-            designs, merit = designs[best], merit[best]
-    return designs, merit
+    columns = dict.fromkeys([*names, objective, "status", *(limit.output for limit in limits if limit is not None)])
+    best = [(np.empty((0, len(names))), np.empty(0)) for _ in limits]
+    for batch in batches((part.path for part in parts(folder)), list(columns)):
+        values = {name: np.asarray(batch[name], np.float64) for name in columns}
+        new, merit = np.column_stack([values[name] for name in names]), compared(objective, values[objective])
+        feasible = (values["status"] == st.OK) & np.isfinite(merit)
+        for k, limit in enumerate(limits):
+            rows = feasible if limit is None else feasible & meets(limit, values[limit.output])
+            designs, ranks = (np.concatenate(pair) for pair in zip(best[k], (new[rows], merit[rows]), strict=True))
+            kept = np.sort(np.argsort(ranks, kind="stable")[:most]) if len(ranks) > most else slice(None)
+            best[k] = designs[kept], ranks[kept]
+    return best
 
 
 def task_designs(study: Study, count: int, seed: int) -> Array:

@@ -167,7 +167,7 @@ def _designs_and_problem(study: Study, folder: Path) -> tuple[Array, Array, Prob
     """
     if study.objective is None:
         raise MissingInput("objective", "[objective] minimise = an output", str(study.path))
-    designs, merit = best_rows(study.family, study.objective.output, folder)
+    ((designs, merit),) = best_rows(study.family, study.objective.output, folder)
     if not len(designs) and study.optimise is not None:
         designs = random_designs(study, study.optimise.starts, study.optimise.seed)
     if not len(designs):
