@@ -34,7 +34,8 @@ class Uneven(NamedTuple):
     Parameters
     ----------
     delta, fastest, slowest, energy : (n,) (max - min)/mean, extremes of omega, the constant E
-    missed : (n,) share of the kinetic energy's scale that the highest harmonics of the excess have
+    missed : (n,) share of the kinetic energy's scale that the highest harmonics of the excess have; under a motor line
+        also those of the energy's slope
     speed, acceleration : (n, m) omega and d omega/d t = (1/2) d(omega^2)/d phi
     """
 
@@ -88,7 +89,6 @@ def speed_fluctuation(
         energy_scale = all_jc[0] * mean_speed[i] * mean_speed[i]
         left = tail(all_wc, all_ws, energy_scale)
         code = _checked(all_jc, all_js, all_wc, left, coarsest)
-        found.missed[i] = left
         all_wc[0], all_ws[0] = 0.0, 0.0
         if slope is not None:
             all_xc[:], all_xs[:] = all_wc, all_ws
@@ -109,12 +109,17 @@ def speed_fluctuation(
             if steady_energy(jc, js, all_xc, all_xs, mean_speed[i], slope[i], e + work[0], max(STILL, left), work):
                 coefficients(work, turn, all_wc, all_ws)
                 e, all_wc[0] = all_wc[0], 0.0
+                # A steep line bends the energy more than the loads do: its slope must be resolved, too.
+                for k in range(half):
+                    all_xc[k], all_xs[k] = k * all_ws[k], -k * all_wc[k]
+                left = max(left, tail(all_xc, all_xs, energy_scale))
+                code = st.NOT_CONVERGED if left > coarsest else st.OK
                 count = significant(all_wc, all_ws)
                 wc, ws = all_wc[:count], all_ws[:count]
                 on_grid(wc, ws, looks, fine_w)
             else:
                 code = st.JAMMED
-        status[i], found.energy[i] = code, e
+        status[i], found.energy[i], found.missed[i] = code, e, left
         high = _extreme(jc, js, wc, ws, e, 1.0, fine_j, fine_w) if code == st.OK else math.nan
         low = _extreme(jc, js, wc, ws, e, -1.0, fine_j, fine_w) if code == st.OK else math.nan
         found.fastest[i], found.slowest[i], found.delta[i] = high, low, (high - low) / mean_speed[i]

@@ -88,6 +88,9 @@ def steady(
     found = {"unevenness": out.delta, "fastest": out.fastest, "slowest": out.slowest, "missed": out.missed}
     with np.errstate(divide="ignore", invalid="ignore"):
         torque = (beyond(excess) / speed**2 + 0.5 * beyond(inertia, order=1)) / inertia.mean(axis=1)
+        if slope is not None:  # the line makes a torque of what the speed misses
+            stiffness = np.abs(slope / (inertia.mean(axis=1) * speed))
+            torque = np.maximum(torque, np.where(slope > 0.0, PER_LEFT * out.missed * (1.0 + stiffness), 0.0))
     energy = np.maximum(PER_LEFT * out.missed, torque / (inertia.shape[1] // 2))
     found |= {"energy_error": np.maximum(ERROR, energy), "torque_error": torque}
     return found | {"crank_speed": sense * out.speed, "crank_acceleration": sense * out.acceleration}, status
