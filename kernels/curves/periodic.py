@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.curves.root_search import bisected
-from kernels.jit import inline, kernel
+from kernels.curves.root_search import bisected, false_position
+from kernels.jit import inline, kernel, part
 from kernels.types import EPS, Array
 
 NOTHING = 1e-14  # error of the coefficients by the drift of the rotations, as a share of the largest coefficient
@@ -132,14 +132,17 @@ LEVEL = 16.0 * EPS  # of the size: differences that are rounding
 
 @kernel
 def turn_extremes(
-    values: Array, largest: Array, phi_largest: Array, least: Array, phi_least: Array, rms: Array, missed: Array
-) -> None:
+    values: Array, known: Array, largest: Array, phi_largest: Array, least: Array, phi_least: Array, rms: Array,
+    missed: Array,
+) -> None:  # fmt: skip
     """Compute extremes and root mean square of curves over one turn.
 
     Parameters
     ----------
     values : (n, N) samples at phi_j = 2 pi j / N, N odd
-    largest, phi_largest, least, phi_least : (n,) out; extremes and their crank angles [rad]
+    known : (n,) relative errors of the samples
+    largest, least : (n,) out; extremes
+    phi_largest, phi_least : (n,) out; their crank angles [rad], of tops equal within their errors the first's
     rms : (n,) out, by Parseval's sum
     missed : (n,) out; size of the two highest harmonics over the largest, an estimate of what the grid has missed
     """
@@ -157,45 +160,76 @@ def turn_extremes(
         short_c, short_s = c[:count], s[:count]
         look, room = np.empty(FINER * count), np.empty((4, FINER * count))
         on_grid(short_c, short_s, room, look)
-        phi_largest[i] = _peak(short_c, short_s, 1.0, look)
-        phi_least[i] = _peak(short_c, short_s, -1.0, look)
-        largest[i] = series(short_c, short_s, phi_largest[i])[0]
-        least[i] = series(short_c, short_s, phi_least[i])[0]
+        err = known[i] + missed[i]
+        largest[i], phi_largest[i] = _peak(short_c, short_s, 1.0, look, err)
+        least[i], phi_least[i] = _peak(short_c, short_s, -1.0, look, err)
+
+
+@inline
+def _slope(phi: float, c: Array, s: Array) -> float:
+    return series(c, s, phi)[1]
 
 
 @inline
 def _rises(phi: float, c: Array, s: Array, sign: float) -> bool:
-    return sign * series(c, s, phi)[1] > 0.0
+    return sign * _slope(phi, c, s) > 0.0
 
 
 @inline
-def _climbed(c: Array, s: Array, sign: float, low: float, high: float) -> float:
-    """Find the top between two crank angles by bisection."""
-    low, high = bisected(_rises, low, high, c, s, sign)
-    return 0.5 * (low + high)
+def _bound(before: float, here: float, after: float) -> float:
+    """Height that a top at a sample hardly exceeds: by twice the parabola's rise and a fourth of the falls beside it.
+
+    Of 15000 tops of random series 6 exceeded it, by 0.1 % of the size.
+    """
+    fall = 2.0 * here - before - after
+    return here + 0.25 * ((after - before) * (after - before) / fall + fall) if fall > 0.0 else here
 
 
-@inline
-def _peak(c: Array, s: Array, sign: float, look: Array) -> float:
-    """Find the crank angle in [0, 2 pi) where sign times the series is largest, starting from equidistant samples."""
-    step, n, best, size = 2.0 * math.pi / look.size, look.size, 0, 0.0
+@part
+def _top(c: Array, s: Array, sign: float, look: Array, j: int, least: float) -> tuple[float, float]:
+    """Find crank angle and height of the top at sample j; -inf if there is none above ``least``."""
+    n = look.size
+    before, here, after = sign * look[j - 1], sign * look[j], sign * look[(j + 1) % n]
+    angle, height = 0.0, -math.inf
+    if here >= before and here >= after and _bound(before, here, after) > least:
+        step = 2.0 * math.pi / n
+        low, high = step * (j - 1), step * (j + 1)
+        at_low, at_high = _slope(low, c, s), _slope(high, c, s)
+        if sign * at_low > 0.0 and sign * at_high < 0.0:
+            angle = false_position(_slope, low, high, at_low, at_high, c, s)
+        else:
+            angle = bisected(_rises, low, high, c, s, sign)[0]
+        height = sign * series(c, s, angle)[0]
+    return angle, height
+
+
+@part
+def _peak(c: Array, s: Array, sign: float, look: Array, err: float) -> tuple[float, float]:
+    """Find the value farthest in the sense of ``sign``, and its crank angle in [0, 2 pi), from equidistant samples.
+
+    Of tops that differ by less than twice their error, a share ``err`` of the size, the first of the turn counts.
+    """
+    n, best, size = look.size, 0, 0.0
     for j in range(n):
         best = j if sign * look[j] > sign * look[best] else best
         size = max(size, abs(look[j]))
-    where = _climbed(c, s, sign, step * (best - 1), step * (best + 1))
-    highest = sign * series(c, s, where)[0]
+    where, highest = _top(c, s, sign, look, best, -math.inf)
     for j in range(n):
-        before, here, after = sign * look[j - 1], sign * look[j], sign * look[(j + 1) % n]
-        fall = 2.0 * here - before - after
-        if j == best or here < before or here < after or not fall > 0.0:
+        if j == best:
             continue
-        # No top rises above its sample by more than twice the parabola's rise; a level curve has rounding tops alone.
-        if here + 0.25 * (after - before) * (after - before) / fall > highest + LEVEL * size:
-            angle = _climbed(c, s, sign, step * (j - 1), step * (j + 1))
-            top = sign * series(c, s, angle)[0]
-            if top > highest:
-                highest, where = top, angle
-    return where + 2.0 * math.pi if where < 0.0 else where
+        # a level curve has rounding tops alone
+        angle, height = _top(c, s, sign, look, j, highest + LEVEL * size)
+        if height > highest:
+            highest, where, best = height, angle, j
+    # A place closer to the end of the turn than its error counts as just after its beginning.
+    early = -math.sqrt(err)
+    for j in range(best if where >= early else n):
+        least = highest - 2.0 * err * size
+        angle, height = _top(c, s, sign, look, j, least)
+        if height >= least and angle >= early:
+            where = angle
+            break
+    return sign * highest, where + 2.0 * math.pi if where < 0.0 else where
 
 
 STEPS, STILL = 6, 1e-6  # most steps to a top; a step shorter than STILL [rad] leaves an error far below rounding
@@ -242,15 +276,15 @@ def _slopes(series: NDArray[np.complex128], phi: float, mode: int) -> tuple[floa
     """Value and first two derivatives of the climbed curve at one angle, from the series (q, K + 1)."""
     height, rising, bend, last = 0.0, 0.0, 0.0, series.shape[1] - 1
     turn = complex(math.cos(phi), math.sin(phi))
-    for part in range(series.shape[0]):
+    for curve in range(series.shape[0]):
         waves, first, second = 0j, 0j, 0j
         for order in range(last, 0, -1):  # the small ones first
             # the highest order of an even number of samples has no conjugate partner
-            term = (2.0 if order < last else 1.0) * series[part, order]
+            term = (2.0 if order < last else 1.0) * series[curve, order]
             waves = (waves + term) * turn
             first = (first + order * term) * turn
             second = (second + order * order * term) * turn
-        value, slope, bent = series[part, 0].real + waves.real, -first.imag, -second.real
+        value, slope, bent = series[curve, 0].real + waves.real, -first.imag, -second.real
         if mode != 0:
             return mode * value, mode * slope, mode * bent
         height += value * value

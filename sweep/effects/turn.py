@@ -82,7 +82,7 @@ def reductions(
     """
     n = len(values)
     largest, phi_largest, least, phi_least, rms, missed = (np.empty(n) for _ in range(6))
-    turn_extremes(np.ascontiguousarray(values), largest, phi_largest, least, phi_least, rms, missed)
+    turn_extremes(np.ascontiguousarray(values), np.full(n, known), largest, phi_largest, least, phi_least, rms, missed)
     status[(status == st.OK) & ~(missed < limit)] = st.NOT_CONVERGED
     size = np.maximum(np.abs(largest), np.abs(least))
     # The curve is as accurate as the steady state that it comes from.

@@ -27,7 +27,7 @@ _MOST_STEPS = 40
 _SMALL = 1e-9  # steps of Newton's method from here on are quadratically short, or rounding
 # From the guess to the links' own lengths: steps of Newton's method in all and at one stage, which ends when a step is
 # as small as CLOSE, and the least share of the way that one stage may be.
-_MOST_IN_ALL, _MOST_OF_STAGE, _CLOSE, _LEAST_SHARE = 60, 12, 1e-3, 2.0**-8
+_MOST_IN_ALL, _MOST_OF_STAGE, _CLOSE, _LEAST_SHARE = 400, 12, 1e-3, 2.0**-16
 
 OUTPUTS = ("x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi", "determinant")
 

@@ -11,12 +11,12 @@ SAMPLES = 101
 DENSE = np.arange(40_000) * (2.0 * np.pi / 40_000)
 
 
-def extremes(curves):
+def extremes(curves, known=1e-14):
     """Largest value, its place, least value, its place, of curves given as functions of the crank angle."""
     phi = np.arange(SAMPLES) * (2.0 * np.pi / SAMPLES)
     values = np.ascontiguousarray([curve(phi) for curve in curves])
     found = [np.empty(len(values)) for _ in range(6)]
-    turn_extremes(values, *found)
+    turn_extremes(values, np.full(len(values), known), *found)
     return found[:4]
 
 
@@ -42,3 +42,27 @@ def test_no_dense_pose_is_beyond_the_extremes(order):
 def test_a_level_curve_is_its_own_extremes():
     largest, _, least, _ = extremes([lambda phi: np.full(len(phi), 3.0)])
     np.testing.assert_allclose([largest[0], least[0]], 3.0, rtol=1e-15)
+
+
+@pytest.mark.parametrize("known", [1e-14, 1e-9])
+def test_of_tops_of_equal_height_the_first_of_the_turn_is_the_place(known):
+    """The top next to the highest sample was taken: of curves of period pi that of the second half in every second one.
+
+    Tops beside the angle 0 within the place's error, the square root of the value's, count as its first.
+    """
+    random = np.random.default_rng(5)
+    parts = [random_curve(random, 8) for _ in range(400)]
+    _, phi_largest, _, phi_least = extremes([lambda phi, f=f: f(2.0 * phi) for f in parts], known)
+    turn = np.sqrt(known)
+    assert (np.mod(phi_largest + turn, 2.0 * np.pi) <= np.pi + 2.0 * turn).all()
+    assert (np.mod(phi_least + turn, 2.0 * np.pi) <= np.pi + 2.0 * turn).all()
+
+
+def test_a_top_lower_by_more_than_the_errors_is_not_the_place_though_it_comes_first():
+    """The second top is higher by 2e-6 of the size: equal for values known to 2e-6, not for values known to 5e-7."""
+    curve = [lambda phi: np.cos(2.0 * (phi - 1.0)) - 1e-6 * np.cos(phi - 1.0)]
+    # the places move by 1e-6/4 sin(0) = 0: the tops stay at 1 and 1 + pi
+    largest, near, _, _ = extremes(curve, 2e-6)
+    np.testing.assert_allclose([largest[0], near[0]], [1.0 + 1e-6, 1.0], rtol=1e-7)
+    largest, far, _, _ = extremes(curve, 5e-7)
+    np.testing.assert_allclose([largest[0], far[0]], [1.0 + 1e-6, 1.0 + np.pi], rtol=1e-7)
