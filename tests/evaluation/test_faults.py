@@ -62,6 +62,25 @@ def test_tables(table: Any) -> None:
     refused("allowed: a DataFrame of pandas, or a dict of columns", sweep.summarise, "rssr", table, "swing")
 
 
+@pytest.mark.parametrize(
+    ("family", "design", "word", "name"),
+    [
+        ("slider_crank", {"a": 1.0, "b": 3.0}, "offset", "e"),
+        ("inverted_slider_crank", {"a": 1.0, "e": 3.0}, "offset", "h"),
+        ("slotted", {"a": 1.0, "e": 3.0}, "Offset", "s"),
+        ("cam", {"lift": 1.0, "r0": 3.0}, "eccentricity", "e"),
+        ("four_bar", {"a": 2.0, "b": 7.0, "c": 9.0, "e": 6.0}, "assembly mode", "branch"),
+    ],
+)
+def test_a_textbooks_word_for_a_dimension_with_a_default_is_not_passed_over(
+    family: str, design: dict[str, float], word: str, name: str
+) -> None:
+    """It would be computed with the default, for example a slider-crank in line."""
+    words = f"table: column = '{word}'; allowed: the columns"
+    refused(words, sweep.evaluate, family, design | {word: 0.5}, "status", phi=0.1)
+    refused(f"did you mean '{name}'?", sweep.evaluate, family, design | {word: 0.5}, "status", phi=0.1)
+
+
 def test_what_the_message_of_a_wrong_table_advises_is_taken() -> None:
     refused("a Series with the values of one design by .to_dict()", sweep.summarise, "rssr", FRAME.iloc[0], "swing")
     refused("a list of designs by pandas.DataFrame(list)", sweep.summarise, "rssr", [ROCKER, ROCKER], "swing")
@@ -84,6 +103,12 @@ def test_families(family: Any) -> None:
 @pytest.mark.parametrize("function", [sweep.summarise, sweep.evaluate])
 def test_wants(function: Any, want: Any) -> None:
     refused("allowed: a name, or a list of names", function, "rssr", ROCKER | {"phi": 1.0}, want)
+
+
+@pytest.mark.parametrize(("word", "name"), [("theta4", "psi"), ("omega4", "dpsi"), ("alpha4", "d2psi")])
+def test_an_output_by_the_number_of_its_link(word: str, name: str) -> None:
+    design = {"a": 2.0, "b": 7.0, "c": 9.0, "e": 6.0}
+    refused(f"did you mean '{name}'?", sweep.evaluate, "four_bar", design, word, phi=0.1)
 
 
 def test_an_output_asked_of_the_wrong_function() -> None:
