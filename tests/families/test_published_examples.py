@@ -54,6 +54,17 @@ ADAMS_RSSR = [
 ]
 
 
+# IFToMM benchmark of the spatial slider-crank, solution of Masarati by MBDyn: turn of the crank, place of the slider.
+MBDYN_RSSP = [
+    (0.5600213536265, 0.2267867),
+    (1.287191842519, 0.2630368),
+    (3.063028402641, 0.2821285),
+    (4.404676961283, 0.2230848),
+    (5.574337284775, 0.1849586),
+    (8.060717629202, 0.2807141),
+]
+
+
 def test_crank_rocker_of_goessner_swings_80_degrees_in_nine_tenths_of_the_return() -> None:
     # Published: crank 60 and frame 120, swing 80 deg, ratio 10/9; coupler 103, rocker 94, transmission angle 35 deg.
     links = {"a": 60.0, "b": 103.197, "c": 93.965, "e": 120.0, "branch": -1.0} | PLANAR
@@ -225,3 +236,20 @@ def test_belt_of_bevan_transmits_the_printed_power() -> None:
     # Theory of Machines, page 228: 165 deg of wrap, mu = 0.3, 500 lb in both sides at rest, 60 ft/s: 44.40 hp.
     ratio = thread.capstan({"T1": 1.0, "wrap": "165 deg", "mu": 0.3})["T2"][0]
     assert 2.0 * 500.0 * (ratio - 1.0) / (ratio + 1.0) * 60.0 / 550.0 == pytest.approx(44.40, abs=0.005)
+
+
+@pytest.mark.parametrize(("turn", "place"), MBDYN_RSSP)
+def test_spatial_slider_crank_moves_as_in_mbdyn(turn: float, place: float) -> None:
+    points = {"A": [0.0, 0.1, 0.12], "B": [0.0, 0.1, 0.2], "C": [0.2, 0.0, 0.0], "D": [0.0, 0.0, 0.0]}
+    drawn = sweep.from_points("rssp", **points, axis_A=[1.0, 0.0, 0.0], axis_D=[1.0, 0.0, 0.0])
+    design = drawn.parameters | {"branch": drawn.branch}
+    found = sweep.evaluate("rssp", design, "s", phi=drawn.phi + turn)
+    # Half a unit of the last digit, and as much for the constraints that MBDyn integrates.
+    assert found["s"][0] == pytest.approx(place, abs=1e-7)
+
+
+def test_coupler_point_is_where_solvespace_puts_it() -> None:
+    # Its own test: crank 35 at 45 deg, coupler 70 with arms of 40 to the point, rocker 70, frame 90.
+    design = {"a": 35.0, "b": 70.0, "c": 70.0, "e": 90.0, "xi": 35.0, "eta": math.sqrt(375.0), "branch": -1}
+    found = sweep.evaluate("four_bar", design, "x_m, y_m", phi="45 deg").iloc[0]
+    assert (found["x_m"], found["y_m"]) == pytest.approx((39.54852, 61.91009), abs=1e-5)  # cut, not rounded
