@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
 from sweep.cli.options import BACKEND, JOBS, OUT, SMOKE, STUDY
-from sweep.errors import SearchCutShort
+from sweep.errors import InputError, SearchCutShort, StoreError
 from sweep.jobs.progress import stages
 
 
@@ -70,11 +72,21 @@ def run(
         if is_part(folder):  # the answer is for the whole dataset, after the parts are merged
             click.echo(f"part: {folder}")
             return
-        answer = ending(folder)
-        for line in (*answer.lines, *([] if report else [answer.next])):
-            click.echo(line)
-        click.echo(f"dataset: {folder}")
-        code = written(folder, None, figures) if report else 0
+        with _read_back(folder):
+            answer = ending(folder)
+            for line in (*answer.lines, *([] if report else [answer.next])):
+                click.echo(line)
+            click.echo(f"dataset: {folder}")
+            code = written(folder, None, figures) if report else 0
     if cut_short is not None:
         raise cut_short
     click.get_current_context().exit(answer.exit_code or code)
+
+
+@contextmanager
+def _read_back(folder: Path) -> Iterator[None]:
+    """Tell what this run has just written, and finds no more, as a fault of the disk, not of the input."""
+    try:
+        yield
+    except InputError as error:
+        raise StoreError(f"{folder}: removed or changed since this run wrote it; run again") from error

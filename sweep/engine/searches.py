@@ -13,7 +13,7 @@ from sweep import optimise
 from sweep.chunks import plan as plans
 from sweep.dataset import files
 from sweep.dataset.files import TABLES, altered, digests, metadata
-from sweep.errors import Interrupted, SearchCutShort
+from sweep.errors import Interrupted, SearchCutShort, StoreError
 from sweep.jobs.executors import Executor, Here, executor
 from sweep.jobs.progress import Phases, Progress
 from sweep.jobs.signals import Stop, stop_on_signal
@@ -61,9 +61,17 @@ def _stoppable(folder: Path, words: str) -> Iterator[Stop]:
             raise Interrupted(number, f"{folder}: stopped by signal {number} while {words}") from None
 
 
+def _own_plan(folder: Path) -> dict[str, Any]:
+    """Return the plan that this run has written."""
+    note = files.trusted_plan(folder)
+    if note is None:
+        raise StoreError(f"{folder}: removed since this run wrote it; run again")
+    return note
+
+
 def _optimise(study: Study, folder: Path, jobs: int, progress: bool) -> None:
     """Run the optimiser unless an intact result for this key is there already."""
-    note = files.read_plan(folder) or {}
+    note = _own_plan(folder)
     key = optimum_key(study, note)
     place = files.beside(folder)
     survey = optimise.read_survey(place / files.OPTIMUM)
@@ -92,7 +100,7 @@ def _front(study: Study, folder: Path, jobs: int, progress: bool) -> None:
         (files.beside(folder) / files.PARETO).unlink(missing_ok=True)
         return
 
-    note = files.read_plan(folder) or {}
+    note = _own_plan(folder)
     key = optimum_key(study, note)
     place, recorded = files.beside(folder), dict(note.get(TABLES) or {})
     damaged = altered(place, note, [files.PARETO])
@@ -138,7 +146,7 @@ def prove(study: Study, folder: Path, jobs: int, backend: str, progress: bool) -
     if study.optimise is None or study.optimise.prove is None:
         (place / files.PROOF).unlink(missing_ok=True)
         return False
-    note = files.read_plan(folder) or {}
+    note = _own_plan(folder)
     if altered(place, note, [files.PROOF]):
         (place / files.PROOF).unlink(missing_ok=True)
     proof = known_proof(study, folder) or _proven(study, folder, jobs, backend, progress)

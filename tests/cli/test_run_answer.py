@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
@@ -131,3 +134,26 @@ def test_front_cut_short_ends_with_124_and_goes_on(tmp_path: Path) -> None:
 def test_unseen_share_that_cannot_be_is_refused(tmp_path: Path, unseen: str) -> None:
     code, text = run(tmp_path, STUDY.format(swing=40).replace("seed = 1\n", f'seed = 1\nunseen = "{unseen}"\n'))
     assert code == 2 and "optimise.unseen" in text
+
+
+@pytest.mark.parametrize("moment", ["sweep.engine.run.search", "sweep.report.terminal.ending"])
+@pytest.mark.parametrize("gone", ["out", "out/designs", "out/_plan.json"])
+def test_what_is_removed_behind_the_sweep_is_a_fault_of_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str, gone: str
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY.format(swing=40))
+    module, name = moment.rsplit(".", 1)
+    work = getattr(import_module(module), name)
+
+    def removed(*given: Any) -> Any:
+        place = tmp_path / gone
+        if place.is_dir():
+            shutil.rmtree(place)
+        else:
+            place.unlink()
+        return work(*given)
+
+    monkeypatch.setattr(moment, removed)
+    found = CliRunner().invoke(main, ["run", str(tmp_path), "--out", str(tmp_path / "out" / "designs"), "--jobs", "1"])
+    assert found.exit_code == 74 and isinstance(found.exception, SystemExit), found.exception
+    assert "since this run wrote it; run again" in found.stderr
