@@ -12,6 +12,8 @@ from typing import Any
 LONGEST = 200  # characters of a value in a message
 MOST_FAULTS = 30  # of a study file in its message
 MOST_NAMES = 40  # in one list of a message
+# What loaders, Python, zstd and the operating system say where no memory is left.
+_FULL = ("failed to map segment", "can't start new thread", "not enough memory", "Cannot allocate memory")
 
 
 class LinksweepError(Exception):
@@ -70,6 +72,11 @@ def reason(error: OSError) -> str:
     """Say what the operating system refuses, and for which file, without the number of the error."""
     words = error.strerror or str(error)
     return f"{words} ({error.filename})" if error.filename else words
+
+
+def is_memory_full(error: BaseException) -> bool:
+    """Whether an error says that memory is full, also for a library to be loaded, a thread or a compressor."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _FULL)
 
 
 def how_many(count: int, thing: str, ending: str = "s") -> str:

@@ -18,7 +18,16 @@ from typing import Any, TextIO
 import click
 from click.shell_completion import CompletionItem
 
-from sweep.errors import LinksweepError, LinksweepWarning, ProgramFault, StoreError, WorkerDied, nearest, reason
+from sweep.errors import (
+    LinksweepError,
+    LinksweepWarning,
+    ProgramFault,
+    StoreError,
+    WorkerDied,
+    is_memory_full,
+    nearest,
+    reason,
+)
 from sweep.jobs.signals import leaving_within
 
 SIGNALLED = 128  # plus the number of the signal: the exit code that a shell expects of an interrupted command
@@ -111,16 +120,16 @@ class Verbs(click.Group):
         except KeyboardInterrupt as error:
             click.echo("sweep: interrupted", err=True)
             ctx.exit(SIGNALLED + getattr(error, "number", signal.SIGINT))
-        except OSError as error:
-            if error.errno == errno.EPIPE:  # the reader has closed the pipe, which click handles
+        except (OSError, MemoryError, ImportError, RuntimeError) as error:
+            if is_memory_full(error):
+                _last_words("sweep: the memory it may use is full; fewer jobs need less")
+                ctx.exit(WorkerDied.exit_code)
+            if not isinstance(error, OSError) or error.errno == errno.EPIPE:  # click handles a closed pipe
                 raise
             gone = isinstance(error, FileNotFoundError) and not _is_here()
             words = "the folder it was started in is not there any more; go to another one" if gone else reason(error)
             _last_words(f"sweep: {words}")
             ctx.exit(StoreError.exit_code)
-        except MemoryError:
-            _last_words("sweep: the memory it may use is full; fewer jobs need less")
-            ctx.exit(WorkerDied.exit_code)
 
 
 def _last_words(text: str) -> None:

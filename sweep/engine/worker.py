@@ -12,12 +12,9 @@ from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
 from sweep.chunks.chunk import compute_chunk
 from sweep.dataset.chunk_files import parts, write_chunk
-from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError, WorkerDied
+from sweep.errors import InputError, LinksweepError, ProgramFault, StoreError, WorkerDied, is_memory_full
 from sweep.families.base import Columns
 from sweep.study import Study
-
-# Message of the loader for a library that does not fit into memory.
-UNMAPPED = "failed to map segment"
 
 
 @dataclass(frozen=True)
@@ -61,7 +58,7 @@ class ChunkTask:
         except LinksweepError as error:
             return Done(number, error=error)
         except Exception as error:  # a bug: the parent raises it, with the trace of this worker
-            if isinstance(error, MemoryError) or UNMAPPED in str(error):
+            if is_memory_full(error):
                 why = f"the memory it may use is full, in chunk {number}; fewer jobs need less"
                 message = f"{self.folder}: {why}; finished chunks are kept, run again to continue"
                 return Done(number, error=WorkerDied(message))

@@ -247,7 +247,15 @@ def test_a_link_in_place_of_the_folder_that_leads_nowhere_is_said(whole: tuple[P
         sweep.run(whole[0], dataset)
 
 
-@pytest.mark.parametrize("error", [MemoryError(), ImportError("libarrow.so: failed to map segment from shared object")])
+FULL_MEMORY = [
+    MemoryError(),
+    ImportError("libarrow.so: failed to map segment from shared object"),
+    RuntimeError("can't start new thread"),
+    OSError("Zstd compression failed: Allocation error : not enough memory"),
+]
+
+
+@pytest.mark.parametrize("error", FULL_MEMORY)
 def test_full_memory_is_no_error_in_the_program(
     whole: tuple[Path, Path], tmp_path: Path, error: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -257,6 +265,23 @@ def test_full_memory_is_no_error_in_the_program(
     monkeypatch.setattr(sweep.engine.worker, "compute_chunk", full)
     with pytest.raises(WorkerDied, match="the memory it may use is full, in chunk 0; fewer jobs need less"):
         sweep.run(whole[0], tmp_path / "designs", jobs=1)
+
+
+@pytest.mark.parametrize("error", FULL_MEMORY)
+def test_full_memory_of_the_program_itself_is_said(
+    whole: tuple[Path, Path], tmp_path: Path, error: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run with 780 MB ended with a traceback where its progress began a thread."""
+
+    def full(*given: object) -> None:
+        raise error
+
+    said: list[str] = []  # by the last words, which also give up the standard output for good
+    monkeypatch.setattr(sys.modules["sweep.cli.main"], "_last_words", said.append)
+    monkeypatch.setattr("sweep.dataset.store.finished_chunks", full)
+    done = CliRunner().invoke(main, ["run", str(whole[0]), "--out", str(tmp_path / "designs")])
+    assert done.exit_code == 70 and isinstance(done.exception, SystemExit), done.exception
+    assert said == ["sweep: the memory it may use is full; fewer jobs need less"]
 
 
 def test_the_parent_folder_may_be_exported(dataset: Path) -> None:
