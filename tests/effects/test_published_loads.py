@@ -164,3 +164,26 @@ def test_ball_bearing_has_the_printed_load_and_life(
     found = sweep.summarise("slotted", design | {"dynamic_capacity_a": capacity}, "mean_load_a1, life_a1").iloc[0]
     assert found["mean_load_a1"] == pytest.approx(load, abs=0.05)
     assert found["life_a1"] / 3600.0 == pytest.approx(hours, abs=digit)
+
+
+def test_friction_of_an_eccentric_drive_is_that_of_bevans_friction_circles() -> None:
+    """Theory of Machines, page 198: eccentric 8 in, rod 80 in, 6 tons on the slider, mu = 0.05 in three journals.
+
+    The slider drives: 3.64 ton ft without friction, 3.06 with it, efficiency 84.17 %.
+    """
+    design = {"a": 8.0, "b": 80.0, "m_crank": 0.0, "m_coupler": 0.0, "m_slider": 0.0, "speed": 1.0, "load_force": -6.0}
+    design |= {
+        "mu_a": 0.05,
+        "mu_b": 0.05,
+        "mu_c": 0.05,
+        "mu_d": 0.0,
+        "radius_a": 7.0,
+        "radius_b": 15.0,
+        "radius_c": 4.4,
+    }
+    design |= {"support_a1": -1.0, "support_a2": 1.0, "support_d1": -1.0, "support_d2": 1.0}
+    found = sweep.evaluate("slider_crank", design, "drive_torque, drive_torque_friction", phi="60 deg").iloc[0]
+    # Half a unit of the last printed digit.
+    assert -found["drive_torque"] / 12.0 == pytest.approx(3.64, abs=0.005)
+    assert -found["drive_torque_friction"] / 12.0 == pytest.approx(3.06, abs=0.005)
+    assert found["drive_torque_friction"] / found["drive_torque"] == pytest.approx(0.8417, abs=5e-5)
