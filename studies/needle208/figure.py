@@ -17,8 +17,8 @@ from studies.figure import folder_asked, print_table, save_chart
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.jobs.progress import Phases, Say, unsaid
-from sweep.optimise.manufacture.robust import compared_within_limits
-from sweep.optimise.manufacture.tolerance import sampled_designs
+from sweep.optimise.manufacture.margins import inequalities
+from sweep.optimise.manufacture.tolerance import sampled_designs, within_limits
 from sweep.optimise.starts.posing import problem_of
 from sweep.report.dataset import read_dataset
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
@@ -58,8 +58,9 @@ def price(study: Study, designs: dict[str, Array], say: Say = unsaid) -> pd.Data
     for name, design in designs.items():
         say("figure", len(rows), len(designs), "mechanisms")
         drawn = design_outputs(study.family, design[None, :], ["max_abs_d2s", "max_abs_dev"], study.accuracy)
-        made, good = compared_within_limits(problem, sampled_designs(study.family, design, study.tolerance, 1, SAMPLES))
-        deviation = np.nan_to_num(made["max_abs_dev"], nan=np.inf)
+        sample = sampled_designs(study.family, design, study.tolerance, 1, SAMPLES)
+        made, good = within_limits(problem, inequalities(problem), sample)
+        deviation = np.nan_to_num(made["max_abs_dev"].astype(np.float64), nan=np.inf)
         value = dict(zip(names, design.tolist(), strict=True))
         rows.append(
             {

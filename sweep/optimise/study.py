@@ -185,6 +185,7 @@ def optimise_study(
     deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
     problem, results, survey = _nominal_search(study, dataset, deadline, jobs, say, kept)
     nominal, settings, share = results[0], study.optimise, math.nan
+    sampled: Columns = {}
     if study.tolerance is not None and study.tolerance.robust is not None and settings and survey.ended not in CUT:
         unhurried = replace(settings, time_budget=None)  # one deadline for all following steps
         stored = kept.parts.get("insensitive")
@@ -197,7 +198,7 @@ def optimise_study(
             lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
         if robust_result is not None:
-            results, share = [robust_result.result, *results], robust_result.share
+            results, share, sampled = [robust_result.result, *results], robust_result.share, robust_result.outputs
     if deadline.pulled and survey.ended not in CUT:
         survey = replace(survey, ended="time", late=True)
     tables = 3 if study.tolerance is None else 5
@@ -216,7 +217,7 @@ def optimise_study(
         write(results_folder / files.TOLERANCE, _by_role(study, frame, _tolerance), study)
         say("tables", 4, tables, "tables")
     stopped = survey.ended == "interrupted" or (stop is not None and stop())
-    _write_made(results_folder / files.MADE, study, None if stopped else results[0].design)
+    _write_made(results_folder / files.MADE, study, None if stopped else results[0].design, sampled)
     if stopped or (stop is not None and stop()):
         raise KeyboardInterrupt
     if not deadline.pulled:
@@ -324,9 +325,9 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     return rows
 
 
-def _write_made(path: Path, study: Study, design: Array | None) -> None:
+def _write_made(path: Path, study: Study, design: Array | None, known: Columns) -> None:
     """Write the sample of manufactured mechanisms of the optimum (P,), slow for many limits; None removes the table."""
-    sample = None if design is None else manufactured(study, design)
+    sample = None if design is None else manufactured(study, design, known)
     if sample is None:
         path.unlink(missing_ok=True)
     else:

@@ -19,6 +19,7 @@ from sweep.jobs.signals import Deadline
 from sweep.optimise import Problem, explore, read_survey
 from sweep.optimise.local.model import Model
 from sweep.optimise.manufacture.margins import Scatter, with_margins
+from sweep.optimise.manufacture.tolerance import manufactured
 from sweep.optimise.problem.program import Program
 from sweep.study import Limit, OptimiseSettings, Tolerance, load_study, study_from_data
 from tests.optimise.test_study import STUDY
@@ -30,11 +31,16 @@ ROBUST = STUDY.format(swing=40).replace("samples = 64", "target = 1e-6").replace
 
 
 @pytest.fixture(scope="module")
-def result(tmp_path_factory: pytest.TempPathFactory) -> pd.DataFrame:
+def robust_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("robust")
     (folder / "study.toml").write_text(ROBUST)
-    out = sweep.run(folder, folder / "designs", jobs=1)
-    return pd.read_parquet(out.parent / "_optimum.parquet").set_index("role", drop=False)
+    sweep.run(folder, folder / "designs", jobs=1)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def result(robust_folder: Path) -> pd.DataFrame:
+    return pd.read_parquet(robust_folder / "_optimum.parquet").set_index("role", drop=False)
 
 
 def made(row: pd.Series, count: int) -> float:
@@ -96,6 +102,17 @@ lengths = "0.05 mm"
 angles = "0.1 deg"
 robust = "95 %"
 """
+
+
+def test_table_of_what_is_made_is_that_of_the_design_alone(robust_folder: Path) -> None:
+    """It takes what the search has computed of the same mechanisms; bit for bit it is what they give by themselves."""
+    best = pd.read_parquet(robust_folder / "_optimum.parquet").set_index("role").loc["optimum"]
+    study = load_study(robust_folder)
+    alone = manufactured(study, best[list(study.family.parameter_names)].to_numpy(np.float64))
+    table = pd.read_parquet(robust_folder / "_made.parquet")
+    assert alone is not None and 0.95 <= table["kept"].mean() < 1.0
+    np.testing.assert_array_equal(table[alone.output], alone.values)
+    np.testing.assert_array_equal(table["kept"], alone.kept)
 
 
 def test_what_is_to_be_large_gives_up_no_more_than_it_has_to(tmp_path: Path) -> None:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs, routes
-from sweep.families.base import Array
+from sweep.families.base import Array, Columns
 from sweep.jobs.executors import Task
 from sweep.jobs.progress import best_words
 from sweep.optimise.local.kkt import AGREE, Result
@@ -56,17 +55,15 @@ SHARE_EXCESS = 0.0005  # allowed excess of the sampled share over the wanted one
 
 @dataclass(frozen=True)
 class Robust:
-    """A robust result, the sampled share of mechanisms that keep all limits, and whether time ran out."""
+    """A robust result, the sampled share of mechanisms that keep all limits, and whether time ran out.
+
+    ``outputs`` are those of the sampled mechanisms; none where the share was computed otherwise or by a stopped run.
+    """
 
     result: Result
     share: float
     cut: bool = False
-
-
-def compared_within_limits(problem: Problem, designs: Array) -> tuple[dict[str, Array], NDArray[np.bool_]]:
-    """Return limited outputs of designs (n, P), and which designs keep all limits on outputs, (n,)."""
-    outputs, mask = within_limits(problem, inequalities(problem), designs, problem.objective)
-    return {name: compared(name, np.asarray(x, np.float64)) for name, x in outputs.items()}, mask
+    outputs: Columns = field(default_factory=dict)
 
 
 def _starting_designs(results: Sequence[Result], more: Array | None) -> tuple[list[Array], list[int]]:
@@ -214,8 +211,8 @@ class _Calibrate:
         initial, wanted = self.results[number], self.tolerance.robust or 0.0
         scatter, excess = Scatter(self.problem, self.tolerance), max(SHARE_EXCESS, 1.0 / self.tolerance.samples)
         levels: Levels = dict.fromkeys(margin_keys(self.problem).values(), self.level)
-        values, share = self._sampled_outputs(initial.design)
-        best = Robust(initial, share, initial.ended in CUT)
+        outputs, share = self._sampled_outputs(initial.design)
+        best = self._robust(initial, share, outputs)
         design, result, radius, step, reach, spent = initial.design, initial, RADIUS, math.inf, REACH, 0
         for correction in range(CORRECTIONS):
             if should_stop():
@@ -230,15 +227,15 @@ class _Calibrate:
                 spent += result.looks
                 if not np.array_equal(result.design, design):
                     design = result.design
-                    values, share = self._sampled_outputs(design)
+                    outputs, share = self._sampled_outputs(design)
             value = best.result.objective  # negative if an output is maximised
             gain = (value - result.objective) / (abs(value) or 1.0) if best.share >= wanted else math.inf
             better = share >= wanted and gain > 0.0
             if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
-                best = Robust(result, share, result.ended in CUT)
+                best = self._robust(result, share, outputs)
             if spent >= self.budget or (correction and share >= wanted and not better and result.ended == "looks"):
                 break  # prices of an unsettled search would mislead the correction
-            levels, saving = self._corrected(scatter, design, levels, values, reach)
+            levels, saving = self._corrected(scatter, design, levels, outputs, reach)
             if wanted <= share <= wanted + excess and step < STEP_SETTLED and min(saving, gain) < SAVING_SETTLED:
                 break
             reach *= REACH_FACTOR
@@ -247,10 +244,11 @@ class _Calibrate:
         return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
 
     def _corrected(
-        self, scatter: Scatter, design: Array, levels: Levels, values: Mapping[str, Array], reach: float
+        self, scatter: Scatter, design: Array, levels: Levels, outputs: Columns, reach: float
     ) -> tuple[Levels, float]:
         """Return corrected numbers of standard deviations, and the relative gain that they promise."""
         price_of = prices(scatter, design, levels)
+        values = {name: compared(name, np.asarray(x, np.float64)) for name, x in outputs.items()}
         excess_of = excesses(self.problem, values, price_of)
         if not levels:
             return levels, 0.0
@@ -264,11 +262,17 @@ class _Calibrate:
             corrected[key] = min(max(level + min(shift, MAX_CHANGE), 0.0), MAX_LEVEL)
         return corrected, saving
 
-    def _sampled_outputs(self, design: Array) -> tuple[dict[str, Array], float]:
+    def _sampled_outputs(self, design: Array) -> tuple[Columns, float]:
         """Return limited outputs of a design and of mechanisms around it, and the share that keeps all limits."""
         sample = sampled_designs(self.problem.family, design, self.tolerance, self.seed, self.tolerance.samples)
-        values, mask = compared_within_limits(self.problem, np.concatenate([design[None, :], sample]))
-        return values, float(mask[1:].mean())
+        designs = np.concatenate([design[None, :], sample])
+        outputs, mask = within_limits(self.problem, inequalities(self.problem), designs, self.problem.objective)
+        return outputs, float(mask[1:].mean())
+
+    @staticmethod
+    def _robust(result: Result, share: float, outputs: Columns) -> Robust:
+        """Return a result with its share; ``outputs`` of the design itself come first, and are left out."""
+        return Robust(result, share, result.ended in CUT, {name: column[1:] for name, column in outputs.items()})
 
 
 def _margin_rounds(

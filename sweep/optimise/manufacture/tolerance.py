@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Accuracy, Array, Family, floats
+from sweep.families.base import Accuracy, Array, Columns, Family, floats
 from sweep.families.names import MINUS, is_flag, judged_by, without_minus
 from sweep.optimise.extrema.gradients import level_gradients, scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
@@ -278,13 +278,16 @@ def limits_of_made(study: Study) -> list[Limit]:
     return [Limit(judged_by(x.output), 0.0, None) if is_flag(x.output) else x for x in limits]
 
 
-def manufactured(study: Study, design: Array) -> Manufactured | None:
-    """Sample mechanisms of a design (P,); None without tolerances, a finite design, or an inequality limit."""
+def manufactured(study: Study, design: Array, known: Columns | None = None) -> Manufactured | None:
+    """Sample mechanisms of a design (P,); None without tolerances, a finite design, or an inequality limit.
+
+    ``known`` are outputs of these mechanisms, as far as the search has computed them.
+    """
     limits = limits_of_made(study)
     if study.tolerance is None or study.optimise is None or not limits or not np.isfinite(design).all():
         return None
     designs = sampled_designs(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
-    columns, kept = within_limits(study, limits, designs)
+    columns, kept = within_limits(study, limits, designs, known=known)
     worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
     subset = {name: values[:COST_SAMPLE] for name, values in columns.items()}
     costs = _costs(study, limits, worst, design, designs[:COST_SAMPLE], subset, float(kept[:COST_SAMPLE].mean()))
@@ -292,18 +295,22 @@ def manufactured(study: Study, design: Array) -> Manufactured | None:
 
 
 def within_limits(
-    source: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str
-) -> tuple[dict[str, NDArray[np.generic]], NDArray[np.bool_]]:
-    """Return limited outputs and outputs ``more`` of designs (n, P), and which designs keep all limits, (n,)."""
-    names = list(dict.fromkeys([*(limit.output for limit in limits), *more]))
-    columns = design_outputs(source.family, designs, names, source.accuracy, source.window)
+    source: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str, known: Columns | None = None
+) -> tuple[Columns, NDArray[np.bool_]]:
+    """Return limited outputs and outputs ``more`` of designs (n, P), and which designs keep all limits, (n,).
+
+    What is ``known`` of these designs is not computed again.
+    """
+    names, columns = list(dict.fromkeys([*(limit.output for limit in limits), *more])), known or {}
+    if missing := [name for name in names if name not in columns]:
+        columns = columns | design_outputs(source.family, designs, missing, source.accuracy, source.window)
     masks = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
     return {name: columns[name] for name in names}, np.logical_and.reduce(masks)
 
 
 def _costs(
     study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
-    columns: dict[str, NDArray[np.generic]], baseline: float,
+    columns: Columns, baseline: float,
 ) -> list[Cost]:  # fmt: skip
     """Return the dimensions by the cost of their tolerances, the most expensive first.
 
@@ -340,7 +347,7 @@ def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
     return not meets(limit.drawn_in(math.sqrt(_variance({limit.output: column}, limit))), column).all()
 
 
-def _variance(columns: dict[str, NDArray[np.generic]], limit: Limit) -> float:
+def _variance(columns: Columns, limit: Limit) -> float:
     values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
     finite = values[np.isfinite(values)]
     return float(finite.var()) if finite.size else 0.0
