@@ -27,6 +27,7 @@ from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, spun, sub
 from kernels.jit import inline, kernel
 from kernels.linkage.joints import Joints, read
+from kernels.linkage.outputs import write
 from kernels.types import Array, Status
 
 DRIVEN, DRIVING = 0.0, 1.0
@@ -193,11 +194,7 @@ def centre_acceleration(
             rocker = j.turns * j.c
             total = j.a + j.b + rocker
             s = mix(0.5 * good * (j.a + j.b) / total, crank, 0.5 * (j.b + rocker) / total, driven)
-            if size is not None:
-                size[i, k] = math.sqrt(dot(s, s))
-            if x is not None:
-                x[i, k] = s[0]
-            if y is not None:
-                y[i, k] = s[1]
-            if z is not None:
-                z[i, k] = s[2]
+            write(size, i, k, math.sqrt(dot(s, s)))
+            write(x, i, k, s[0])
+            write(y, i, k, s[1])
+            write(z, i, k, s[2])

@@ -24,6 +24,7 @@ from kernels import status as st
 from kernels.arithmetic.vectors import Vector
 from kernels.curves.periodic import coefficients, series, significant, tail
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
 from kernels.types import Array, Status
 
 Matrix = tuple[float, float, float, float]  # two by two, row by row
@@ -72,12 +73,9 @@ def quasi_static(
             if status[i, j] == st.OK and not abs(lag) <= LINEAR * reach[i] * abs(p[i, j]) / c[i]:
                 status[i, j] = st.NOT_LINEAR
             good = 1.0 if status[i, j] == st.OK or status[i, j] == st.NOT_LINEAR else math.nan
-            if eta is not None:
-                eta[i, j] = good * lag
-            if displacement is not None:
-                displacement[i, j] = good * c[i] * lag
-            if frequency_ratio is not None:
-                frequency_ratio[i, j] = good * math.sqrt(stiffness / inertia) * abs(p[i, j]) / speed
+            write(eta, i, j, good * lag)
+            write(displacement, i, j, good * c[i] * lag)
+            write(frequency_ratio, i, j, good * math.sqrt(stiffness / inertia) * abs(p[i, j]) / speed)
 
 
 class Steady(NamedTuple):

@@ -21,6 +21,7 @@ from kernels.arithmetic.vectors import dot
 from kernels.curves.polynomials import roots_up_to
 from kernels.jit import inline, kernel
 from kernels.linkage.joints import read
+from kernels.linkage.outputs import write
 from kernels.types import EPS, Array, Status
 
 
@@ -51,14 +52,10 @@ def directions(
             j = read(poses[i, k], designs[i])
             good = 1.0 if status[i, k] == st.OK else math.nan
             rho, along = dot(j.s, j.rho), dot(j.s, j.k)
-            if t_tau is not None:
-                t_tau[i, k] = good * j.t_tau
-            if t_rho is not None:
-                t_rho[i, k] = good * rho
-            if t_k is not None:
-                t_k[i, k] = good * along
-            if theta1 is not None:
-                theta1[i, k] = good * math.atan2(abs(rho), abs(j.t_tau))
+            write(t_tau, i, k, good * j.t_tau)
+            write(t_rho, i, k, good * rho)
+            write(t_k, i, k, good * along)
+            write(theta1, i, k, good * math.atan2(abs(rho), abs(j.t_tau)))
             if theta2 is not None:
                 sign = 1.0 if rho >= 0.0 else -1.0
                 theta2[i, k] = good * math.atan2(sign * along, abs(rho))

@@ -22,6 +22,7 @@ import math
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector, cross, dot, norm, sub
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
 from kernels.linkage.thread_path import bend, length, slope, wrap_angle
 from kernels.types import Array, Status
 
@@ -90,16 +91,11 @@ def thread_contour(
             if status[i, j] == st.OK and not (valid and t1 >= 0.0 and angle >= 0.0 and math.isfinite(t2)):
                 status[i, j] = st.INVALID_INPUT
             good = 1.0 if status[i, j] == st.OK else math.nan
-            if tension is not None:
-                tension[i, j] = good * t2
-            if capstan is not None:
-                capstan[i, j] = good * euler
-            if bending is not None:
-                bending[i, j] = good * bent
-            if adhesion is not None:
-                adhesion[i, j] = good * stuck
-            if radius is not None:
-                radius[i, j] = good * thick
+            write(tension, i, j, good * t2)
+            write(capstan, i, j, good * euler)
+            write(bending, i, j, good * bent)
+            write(adhesion, i, j, good * stuck)
+            write(radius, i, j, good * thick)
 
 
 @inline
@@ -174,8 +170,7 @@ def capstan(
             if status[i, j] == st.OK and not valid:
                 status[i, j] = st.INVALID_INPUT
             good = 1.0 if status[i, j] == st.OK else math.nan
-            if tension is not None:
-                tension[i, j] = good * t2
+            write(tension, i, j, good * t2)
             if force is not None:
                 # As a sum of squares it keeps its digits for a nearly straight thread.
                 force[i, j] = good * math.hypot(
@@ -219,14 +214,12 @@ def thread_over_point(
             if status[i, j] == st.OK and not (dot(d1, d1) > 0.0 and dot(d2, d2) > 0.0):
                 status[i, j] = st.SINGULAR
             good = 1.0 if status[i, j] == st.OK else math.nan
-            if total is not None:
-                total[i, j] = good * length(e, n1, n2)
+            write(total, i, j, good * length(e, n1, n2))
             if first is not None and velocity is not None:
                 first[i, j] = good * slope(e, n1, n2, _point(velocity[i, j]))
             if second is not None and velocity is not None and acceleration is not None:
                 second[i, j] = good * bend(e, n1, n2, _point(velocity[i, j]), _point(acceleration[i, j]))
-            if wrap is not None:
-                wrap[i, j] = good * wrap_angle(e, n1, n2)
+            write(wrap, i, j, good * wrap_angle(e, n1, n2))
 
 
 @kernel

@@ -259,16 +259,13 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u, e2 = tree.shaft(d[4])
-        first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-        centre, pivot = scale(d[2], u), (d[1], 0.0, d[3])
+        shaft, k, pivot = tree.main_shaft(d[4], d[2]), (0.0, 0.0, 1.0), (d[1], 0.0, d[3])
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(motion.shape[2]):
             dpsi, d2psi = motion[2, i, j], motion[3, i, j]
             rho, drho, d2rho = motion[4, i, j], motion[5, i, j], motion[6, i, j]
             bodies, axes = out.bodies[i, j], out.axes[i, j]
-            crank = tree.put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
-            ball = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
+            crank, ball = tree.put_crank(bodies[0], axes[0], shaft, d[0], cos_phi[row, j], sin_phi[row, j])
             t = (motion[0, i, j], motion[1, i, j], 0.0)
             n = cross(k, t)
             driven = tree.put_turning(bodies[1], pivot, k, t, dpsi, d2psi)

@@ -204,13 +204,12 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u1, e2 = tree.shaft(d[6])
-        first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-        centre1, foot, os = scale(d[4], u1), (d[3], 0.0, d[5]), (d[3], 0.0, d[8])
+        shaft1, k = tree.main_shaft(d[6], d[4]), (0.0, 0.0, 1.0)
+        foot, os = (d[3], 0.0, d[5]), (d[3], 0.0, d[8])
         still = (math.sin(d[9]) * math.cos(d[10]), math.sin(d[9]) * math.sin(d[10]), math.cos(d[9]))
         st, ct, sb, cb = math.sin(d[22]), math.cos(d[22]), math.sin(d[23]), math.cos(d[23])
         u2, g1, g2 = (st * cb, st * sb, ct), (ct * cb, ct * sb, -st), (-sb, cb, 0.0)
-        centre2, co, so = (d[19], d[20], d[21]), math.cos(d[24]), math.sin(d[24])
+        shaft2, co, so = tree.Shaft((d[19], d[20], d[21]), u2, g1, g2), math.cos(d[24]), math.sin(d[24])
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(motion.shape[2]):
             psi, dpsi, d2psi = motion[0, i, j], motion[1, i, j], motion[2, i, j]
@@ -218,10 +217,8 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
             bodies, axes, lines = out.bodies[i, j], out.axes[i, j], out.lines[i, j]
             u, v = cos_phi[row, j], sin_phi[row, j]
             w, x = u * co - v * so, v * co + u * so
-            crank1 = tree.put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
-            crank2 = tree.put_crank(bodies[1], axes[1], centre2, u2, g1, g2, w, x)
-            pin1 = add(centre1, scale(d[0], mix(u, first, v, e2)))
-            pin2 = add(centre2, scale(d[17], mix(w, g1, x, g2)))
+            crank1, pin1 = tree.put_crank(bodies[0], axes[0], shaft1, d[0], u, v)
+            crank2, pin2 = tree.put_crank(bodies[1], axes[1], shaft2, d[17], w, x)
             cp, sp = math.cos(psi), math.sin(psi)
             rho = (cp, sp, 0.0)
             carrier = tree.put_turning(bodies[2], foot, k, rho, dpsi, d2psi)
@@ -232,7 +229,7 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
             eps = add(mix(d2psi, k, d2chi, n2), gyro)
             none = (0.0, 0.0, 0.0)
             looper = tree.Moving(os, none, none, mix(dpsi, k, dchi, n2), eps)
-            bx = tree.turned_about(k, cp, sp, tree.turned_about(still, cc, sc, first))
+            bx = tree.turned_about(k, cp, sp, tree.turned_about(still, cc, sc, shaft1.first))
             by = tree.turned_about(k, cp, sp, tree.turned_about(still, cc, sc, (0.0, 1.0, 0.0)))
             tree.put_body(bodies[3], looper, bx, by, cross(bx, by), os)
             tree.put(axes[3], n2)

@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import unit_near
-from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale
+from kernels.arithmetic.vectors import Vector, cross, dot, mix, scale
 from kernels.jit import inline, kernel
 from kernels.linkage import bodies as tree
 from kernels.linkage.outputs import put_block
@@ -172,14 +172,11 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u, e2 = tree.shaft(d[4])
-        centre, block = scale(d[2], u), (d[1], 0.0, d[3])
+        shaft, block = tree.main_shaft(d[4], d[2]), (d[1], 0.0, d[3])
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(motion.shape[2]):
             bodies, axes = out.bodies[i, j], out.axes[i, j]
-            first = (1.0, 0.0, 0.0)
-            crank = tree.put_crank(bodies[0], axes[0], centre, u, first, e2, cos_phi[row, j], sin_phi[row, j])
-            pin = add(centre, scale(d[0], mix(cos_phi[row, j], first, sin_phi[row, j], e2)))
+            crank, pin = tree.put_crank(bodies[0], axes[0], shaft, d[0], cos_phi[row, j], sin_phi[row, j])
             rho, drho = motion[0, i, j], motion[1, i, j]
             n = (motion[2, i, j], motion[3, i, j], motion[4, i, j])
             v, a = tree.velocity_at(crank, pin), tree.acceleration_at(crank, pin)

@@ -210,20 +210,29 @@ def put_ball(out: Array, point: Vector) -> None:
     put_line(out[2], point, (0.0, 0.0, 1.0))
 
 
+class Shaft(NamedTuple):
+    """A crank's centre, its axis, and the directions of its angles 0 and 90 degrees."""
+
+    centre: Vector
+    axis: Vector
+    first: Vector
+    second: Vector
+
+
 @inline
-def shaft(alpha: float) -> tuple[Vector, Vector]:
-    """Axis (0, sin alpha, cos alpha) of a crank, and the direction of its crank angle 90 degrees."""
+def main_shaft(alpha: float, along: float) -> Shaft:
+    """Shaft whose axis (0, sin alpha, cos alpha) goes through the origin, with its centre a length along it."""
     sa, ca = math.sin(alpha), math.cos(alpha)
-    return (0.0, sa, ca), (0.0, ca, -sa)
+    axis = (0.0, sa, ca)
+    return Shaft(scale(along, axis), axis, (1.0, 0.0, 0.0), (0.0, ca, -sa))
 
 
 @inline
-def put_crank(
-    out: Array, axis_out: Array, centre: Vector, axis: Vector, first: Vector, second: Vector, u: float, v: float
-) -> Moving:
-    """Write a crank of cosine ``u`` and sine ``v``, from the directions of its angles 0 and 90 degrees."""
-    put(axis_out, axis)
-    return put_turning(out, centre, axis, mix(u, first, v, second), 1.0, 0.0)
+def put_crank(out: Array, axis_out: Array, s: Shaft, radius: float, u: float, v: float) -> tuple[Moving, Vector]:
+    """Write a crank of cosine ``u`` and sine ``v``; return its rates and its pin."""
+    put(axis_out, s.axis)
+    crank = put_turning(out, s.centre, s.axis, mix(u, s.first, v, s.second), 1.0, 0.0)
+    return crank, add(s.centre, scale(radius, mix(u, s.first, v, s.second)))
 
 
 @inline

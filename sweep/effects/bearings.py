@@ -171,8 +171,8 @@ def _effect(
 _PRESSURES: Callable[[Scene], Array] = lambda scene: scene.table(tuple(p.name for p in PERMISSIBLE))  # noqa: E731
 _SLIDING = partial(_compute, bearings.sliding_bearings, SLIDING_INPUTS, SLIDING_OUTPUTS, None)
 _ROLLING = partial(_compute, bearings.rolling_bearings, ROLLING_INPUTS, ROLLING_OUTPUTS, None)
-_SLIDING_LIMITS = partial(_compute, permissible.sliding_limits, SLIDING_INPUTS, SLIDING_LIMITS, _PRESSURES)
-_ROLLING_LIMITS = partial(_compute, permissible.rolling_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
+_SLIDING_LIMITS = partial(_compute, permissible.bearing_limits, SLIDING_INPUTS, SLIDING_LIMITS, _PRESSURES)
+_ROLLING_LIMITS = partial(_compute, permissible.bearing_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
 
 
 def _bent(results: tuple[Output, ...], curves: Callable[[Scene], Array]) -> Bend:

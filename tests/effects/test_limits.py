@@ -102,7 +102,7 @@ def test_a_plane_linkage_at_its_best_angle_permits_what_its_neighbours_do():
     for rho in (0.0, 1e-9):
         components = (np.array([[x]]) for x in (1.0, rho, 0.0))
         angle, status = np.empty((1, 1)), np.zeros((1, 1), np.uint8)
-        permissible.sliding_limits(
+        permissible.bearing_limits(
             *components, np.array([900.0]), data, np.full((1, 3), 2.0), status, None, angle, None
         )  # fmt: skip
         found.append(angle[0, 0])

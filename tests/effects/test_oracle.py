@@ -208,7 +208,7 @@ def test_permissible_pressure_angle_equals_oracle():
         components = np.array([[1.0]]), np.array([[1.0]]), np.array([[np.tan(given["theta2"])]])
         theta1, reserve, status = np.empty((1, 1)), np.empty((1, 1)), np.zeros((1, 1), np.uint8)
         moment = np.array([given["M_c"]])
-        permissible.sliding_limits(*components, moment, data, limits, status, None, theta1, reserve)
+        permissible.bearing_limits(*components, moment, data, limits, status, None, theta1, reserve)
         assert status[0, 0] == st.OK
         assert factor(theta1[0], row["expected"]["theta1"], 1) < 16
         assert reserve[0, 0] == theta1[0, 0] - np.arctan(1.0)

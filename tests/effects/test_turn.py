@@ -137,7 +137,7 @@ def test_rolling_bearings_permit_the_closed_form():
         expected = np.arcsin(np.sqrt(min(squares)))
         got, status = np.empty((1, 1)), np.zeros((1, 1), np.uint8)
         one = np.ones((1, 1))
-        permissible.rolling_limits(
+        permissible.bearing_limits(
             one, one, t * one, np.array([moment]), data, np.array([[capacity]]), status, None, got, None
         )
         assert got[0, 0] == pytest.approx(expected, rel=1e-13)
@@ -158,7 +158,7 @@ def test_utilisation_crosses_one_at_the_permissible_angle(theta1, theta2, mu, li
         s, t = np.sin(angle), np.tan(theta2)
         components = (np.array([[x]]) for x in (np.cos(angle), s, s * t))
         used, allowed, reserve, status = *(np.empty((1, 1)) for _ in range(3)), np.zeros((1, 1), np.uint8)
-        permissible.sliding_limits(*components, moment, data, limits, status, used, allowed, reserve)
+        permissible.bearing_limits(*components, moment, data, limits, status, used, allowed, reserve)
         return used[0, 0], allowed[0, 0], reserve[0, 0], status[0, 0]
 
     used, allowed, reserve, status = at(theta1)

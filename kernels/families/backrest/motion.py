@@ -12,14 +12,13 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
-from kernels.curves.root_search import bisected
+from kernels.curves.root_search import bisected, false_position
 from kernels.families.backrest.closure import BracketPose, Mode, forces, place, residual, scaled, spring
 from kernels.jit import inline, kernel
-from kernels.types import EPS, Array, Status
+from kernels.types import Array, Status
 
 CELLS = 400
 MOST = 8
-_MOST_STEPS = 200  # a bound, so that the loops always end; halving takes some 60
 
 
 @inline
@@ -28,32 +27,14 @@ def _defined(phi: float, d: Array, rho: float, mode: int) -> bool:
 
 
 @inline
+def _residual(phi: float, d: Array, rho: float, mode: int) -> float:
+    return residual(d, phi, rho, mode)[0]
+
+
+@inline
 def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, mode: int) -> float:
-    """Root between a and b, where the signs differ: inverse quadratic steps kept in the bracket (Chandrupatla)."""
-    c, fc, t = a, fa, 0.5
-    for _ in range(_MOST_STEPS):
-        x = a + t * (b - a)
-        fx, _ = residual(d, x, rho, mode)
-        if (fx < 0.0) == (fa < 0.0):
-            c, fc = a, fa
-        else:
-            c, b, fc, fb = b, a, fb, fa
-        a, fa = x, fx
-        best = a if abs(fa) < abs(fb) else b
-        # the small constant: at the root phi = 0 a relative tolerance would never be reached
-        room = 2.0 * EPS * abs(best) + 1e-300
-        if fa == 0.0 or abs(b - a) <= 2.0 * room:
-            return best
-        xi, ratio = (a - b) / (c - b), (fa - fb) / (fc - fb)
-        # the inverse parabola is monotonic in the bracket only under this condition; else halve
-        if ratio * ratio < xi and (1.0 - ratio) * (1.0 - ratio) < 1.0 - xi:
-            t = fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
-        else:
-            t = 0.5
-        # at least the tolerance away from both ends, so that the bracket closes from both sides
-        least = room / abs(b - a)
-        t = min(max(t, least), 1.0 - least)
-    return a if abs(fa) < abs(fb) else b
+    """Root between a, where the residual may be zero, and b, where its sign is another one."""
+    return a if fa == 0.0 else false_position(_residual, a, b, fa, fb, d, rho, mode)
 
 
 @inline
@@ -113,7 +94,7 @@ def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
         if ok0 and ok1 and ok2 and f0 * f1 > 0.0 and f1 * f2 > 0.0 and abs(f1) <= min(abs(f0), abs(f2)):
             dip, f_dip = _dip(d, x0, x2, math.copysign(1.0, f1), rho, mode)
             if f_dip * f1 <= 0.0:
-                count = _kept(roots, count, _bracketed(d, x0, f0, dip, f_dip, rho, mode))
+                count = _kept(roots, count, _bracketed(d, dip, f_dip, x0, f0, rho, mode))
                 count = _kept(roots, count, _bracketed(d, dip, f_dip, x2, f2, rho, mode))
         elif (ok1 or ok2) and f_left == 0.0 and f_right != 0.0:
             count = _kept(roots, count, left)

@@ -176,15 +176,13 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u1, e2 = tree.shaft(d[6])
-        first, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-        centre1, foot = scale(d[4], u1), (d[3], 0.0, d[5])
+        shaft1, k, foot = tree.main_shaft(d[6], d[4]), (0.0, 0.0, 1.0), (d[3], 0.0, d[5])
         # Frame of crank 2: x2 across the shaft, y2 = k along it, z2 = x2 x k; its slide is the shaft's axis.
         x2 = (math.cos(d[21]), math.sin(d[21]), 0.0)
         z2 = cross(x2, k)
         sa, ca = math.sin(d[12]), math.cos(d[12])
         u2, g2 = mix(sa, k, ca, z2), mix(ca, k, -sa, z2)
-        centre2 = add(mix(1.0, foot, -d[10], x2), scale(d[11], u2))
+        shaft2 = tree.Shaft(add(mix(1.0, foot, -d[10], x2), scale(d[11], u2)), u2, x2, g2)
         co, so = math.cos(d[13]), math.sin(d[13])
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(motion.shape[2]):
@@ -193,10 +191,8 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
             bodies, axes, lines = out.bodies[i, j], out.axes[i, j], out.lines[i, j]
             u, v = cos_phi[row, j], sin_phi[row, j]
             w, x = u * co - v * so, v * co + u * so
-            crank1 = tree.put_crank(bodies[0], axes[0], centre1, u1, first, e2, u, v)
-            crank2 = tree.put_crank(bodies[1], axes[1], centre2, u2, x2, g2, w, x)
-            pin1 = add(centre1, scale(d[0], mix(u, first, v, e2)))
-            pin2 = add(centre2, scale(d[8], mix(w, x2, x, g2)))
+            crank1, pin1 = tree.put_crank(bodies[0], axes[0], shaft1, d[0], u, v)
+            crank2, pin2 = tree.put_crank(bodies[1], axes[1], shaft2, d[8], w, x)
             rho = (math.cos(psi), math.sin(psi), 0.0)
             omega, eps = scale(dpsi, k), scale(d2psi, k)
             place = mix(1.0, foot, s, k)

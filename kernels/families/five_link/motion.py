@@ -216,20 +216,18 @@ def links(designs: Array, cos_phi: Array, sin_phi: Array, motion: Array, out: tr
     """
     for i in range(designs.shape[0]):
         d = designs[i]
-        u, e2 = tree.shaft(d[6])
-        e1, k = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
-        centre, foot = scale(d[4], u), (d[3], 0.0, d[5])
+        shaft, k, foot = tree.main_shaft(d[6], d[4]), (0.0, 0.0, 1.0), (d[3], 0.0, d[5])
+        u = shaft.axis
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(motion.shape[2]):
             psi, dpsi = motion[0, i, j], motion[1, i, j]
             d2psi, theta, beta = motion[2, i, j], motion[3, i, j], motion[4, i, j]
             bodies, axes = out.bodies[i, j], out.axes[i, j]
-            crank = tree.put_crank(bodies[0], axes[0], centre, u, e1, e2, cos_phi[row, j], sin_phi[row, j])
-            pin = add(centre, scale(d[0], mix(cos_phi[row, j], e1, sin_phi[row, j], e2)))
+            crank, pin = tree.put_crank(bodies[0], axes[0], shaft, d[0], cos_phi[row, j], sin_phi[row, j])
             rho = (math.cos(psi), math.sin(psi), 0.0)
             rocker = tree.put_turning(bodies[3], foot, k, rho, dpsi, d2psi)
             ball = add(foot, scale(d[2], rho))
-            m = mix(math.cos(theta), e1, math.sin(theta), e2)
+            m = mix(math.cos(theta), shaft.first, math.sin(theta), shaft.second)
             t = cross(u, m)
             cb, sb = math.cos(beta), math.sin(beta)
             hinge = add(pin, mix(d[7], m, d[8], t))
