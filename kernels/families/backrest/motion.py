@@ -28,7 +28,8 @@ def _defined(phi: float, d: Array, rho: float, mode: int) -> bool:
 
 @inline
 def _residual(phi: float, d: Array, rho: float, mode: int) -> float:
-    return residual(d, phi, rho, mode)[0]
+    value: float = residual(d, phi, rho, mode)[0]
+    return value
 
 
 @inline
