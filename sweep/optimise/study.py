@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -35,43 +36,7 @@ from sweep.optimise.starts.posing import problem_and_starts, problem_of, problem
 from sweep.optimise.starts.proportions import insensitive
 from sweep.study import Study
 
-TEXTS = {
-    "role": (
-        "",
-        "optimum, nominal (best drawing where the optimum is robust), start (another one's), or reference",
-    ),
-    "yield": ("1", "share of toleranced mechanisms that keep all limits on outputs; nan for other starts"),
-    "start": ("", "number of the start, best candidate first; -1 for the reference"),
-    "violation": ("1", "largest violation of a limit, relative to the limit; for pressure angles of its sin^2"),
-    "kkt_residual": ("1", "residual of the optimality conditions, variables scaled to their bounds"),
-    "gap": ("1", "difference of the maximum the search worked with and the verified one, relative"),
-    "active": ("", "limits and bounds that hold the result back"),
-    "relaxation": ("", "where infeasible: by how much each limit would have to give way, in its internal unit"),
-    "agree": ("", "number of starts whose objective is within 1e-4 of the best; 1 for those that are not"),
-    "basin": (
-        "",
-        "number of the local optimum it ended at, 1 for the best, values within 1e-4 are one; 0 where infeasible",
-    ),
-    "ended": (
-        "",
-        "converged, stalled, differs (the search followed other extrema than the true ones), infeasible, "
-        "looks (its evaluations were used up), time, interrupted",
-    ),
-    "looks": ("", "evaluations of designs by the search from this start"),
-    "status": ("", "see kernels.status"),
-    "parameter": ("", "dimension that changes"),
-    "output": ("", "design output; its unit is that of _optimum.parquet"),
-    "value": ("unit of the output", "its value; swing and stroke by magnitude"),
-    "growing": ("unit of the output per mm or rad", "its derivative where the dimension grows"),
-    "shrinking": ("unit of the output per mm or rad", "its derivative where the dimension shrinks"),
-    "nominal": ("unit of the output", "value of the exact design"),
-    "mean": ("unit of the output", "mean under the tolerances, three standard deviations each"),
-    "low": ("unit of the output", "2.5 % of the designs are below"),
-    "high": ("unit of the output", "2.5 % of the designs are above"),
-    "missing": ("1", "share of designs without this output"),
-    "within": ("1", "share of designs that keep the limits of this output; of all of them in the last row"),
-    "kept": ("", "whether what is made keeps all limits on outputs"),
-}
+COLUMNS = Path(__file__).parents[1] / "columns.toml"
 
 
 def certificates(results: list[Result]) -> dict[str, list[Any]]:
@@ -111,9 +76,8 @@ def write(
     import pyarrow.parquet as pq
 
     family = study.family
-    texts = (
-        {p.name: (PARAMETER_UNITS[p.unit], p.text) for p in family.parameters} | TEXTS | {"phi": ("rad", "crank angle")}
-    )
+    texts: dict[str, Sequence[str]] = {p.name: (PARAMETER_UNITS[p.unit], p.text) for p in family.parameters}
+    texts |= tomllib.loads(COLUMNS.read_text(encoding="utf-8"))
     texts |= {o.name: (o.unit.replace("length", "mm"), o.text) for o in family.pose_outputs}
     texts |= own_texts
     for name in columns:
