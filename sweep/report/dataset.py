@@ -51,10 +51,10 @@ class Dataset:
     parts: tuple[Path, ...]
     units: dict[str, str]
     definitions: dict[str, str]
-    optima: pd.DataFrame | None
-    curves: pd.DataFrame | None
-    front: pd.DataFrame | None
-    runs: tuple[dict[str, Any], ...]
+    optima: pd.DataFrame | None = None
+    curves: pd.DataFrame | None = None
+    front: pd.DataFrame | None = None
+    runs: tuple[dict[str, Any], ...] = ()
     survey: Survey | None = None
     front_steps: str | None = None
     best: Row | None = None
@@ -211,10 +211,6 @@ def without_rows(study: Study) -> Dataset:
         units={p.name: PARAMETER_UNITS[p.unit] for p in family.parameters}
         | {o.name: o.unit.replace("length", "mm") for o in outputs},
         definitions={o.name: o.text for o in outputs},
-        optima=None,
-        curves=None,
-        front=None,
-        runs=(),
     )
 
 

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kernels import status as codes
-from sweep.evaluation.summaries import design_outputs
 from sweep.exchange.scene import extent
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE
+from sweep.optimise.manufacture.tolerance import within_limits
 from sweep.quantities.dimensions import sizes
-from sweep.quantities.limits import compared, meets
+from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, Row, records
 from sweep.report.made import toleranced
 from sweep.report.quantities import change, number, quantity
@@ -234,8 +234,7 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
         sample = toleranced(data, row, SAMPLES)
         if sample is None:
             return ""
-        columns = design_outputs(study.family, sample[1], [x.output for x in limits], study.accuracy, study.window)
-        share = float(np.logical_and.reduce([meets(limit, columns[limit.output]) for limit in limits]).mean())
+        share = float(within_limits(study, limits, sample[1])[1].mean())
     return f"{number(100.0 * share, 3)}\u00a0% of what is made keeps all limits"
 
 
