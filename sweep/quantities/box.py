@@ -14,7 +14,7 @@ from sweep.families.capabilities import Fixed, skeleton_of
 from sweep.families.machines.machine import Machine
 from sweep.families.parts import Member
 from sweep.families.sites import AXES, TIP
-from sweep.quantities.dimensions import Piece, of_columns
+from sweep.quantities.dimensions import DesignFunction, of_columns
 
 NAMES = tuple(f"box_{axis}" for axis in AXES)
 ROUNDING = 2.0**-53
@@ -35,7 +35,7 @@ class Box:
     output: Output
     curves: tuple[str, ...]
     reductions: tuple[tuple[str, str], ...]
-    still: tuple[Piece, ...]
+    still: tuple[DesignFunction, ...]
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -66,7 +66,7 @@ def _own(of: Stage, axis: int) -> Box | None:
     curves = tuple(dict.fromkeys(f"{name}{stage}" for name in at.values() if name is not None))
     if not curves:
         return None
-    still: list[Piece] = [partial(_coordinate, fixed, axis, of.columns) for fixed in _standing(family)]
+    still: list[DesignFunction] = [partial(_coordinate, fixed, axis, of.columns) for fixed in _standing(family)]
     if None in at.values():
         still.append(lambda designs: 0.0 * designs[:, 0])
     where = f"stage {stage}: " if stage else ""
@@ -87,7 +87,7 @@ def _of_member(m: Member, found: Box) -> Box:
 
 def _whole(machine: Machine, axis: int) -> Box | None:
     """Box of all members along one axis in the machine's frame; a chain is represented by its last stage."""
-    curves, pairs, still = [], [], list[Piece]()
+    curves, pairs, still = [], [], list[DesignFunction]()
     for m in machine.members:
         last = m.family.stages[-1]
         joints = (*_moving(last.family), *((TIP,) if m.tip is not None else ()))

@@ -21,7 +21,7 @@ from sweep.families.base import Accuracy, Array, Columns, Family, Output, Step, 
 from sweep.families.capabilities import Dimensions, skeleton_of
 from sweep.families.machines.machine import Machine
 
-Piece: TypeAlias = Callable[[Any], Any]
+DesignFunction: TypeAlias = Callable[[Any], Any]
 """Function of designs (n, P), real or complex, that returns one number per design, (n,)."""
 
 LEAST_LINK = Output("least_link", "length", "length of the shortest moving link")
@@ -50,7 +50,7 @@ def near_unit_size(family: Family, designs: Array) -> tuple[Array, NDArray[np.in
 
 
 @dataclass(frozen=True)
-class Size:
+class MechanismSize:
     """A size of a family: the minimum (``least``) or maximum of its pieces, which are squares if ``squared``.
 
     Squares are smooth where a length vanishes.
@@ -59,7 +59,7 @@ class Size:
     output: Output
     least: bool
     squared: bool
-    pieces: tuple[Piece, ...]
+    pieces: tuple[DesignFunction, ...]
 
     def values(self, family: Family, designs: Array) -> Array:
         """Size of every design, (n,).
@@ -83,18 +83,18 @@ class _Part:
     member: str = ""
     stage: str = ""
 
-    def of(self, piece: Piece) -> Piece:
+    def of(self, piece: DesignFunction) -> DesignFunction:
         """Piece of the part as a function of the whole design."""
         return partial(of_columns, piece, self.columns)
 
 
-def of_columns(piece: Piece, columns: slice | NDArray[np.intp], designs: Any) -> Any:
+def of_columns(piece: DesignFunction, columns: slice | NDArray[np.intp], designs: Any) -> Any:
     """Evaluate a piece of a part of the mechanism on the part's parameter columns."""
     return piece(designs[:, columns])
 
 
 @of_family
-def sizes(family: Family) -> dict[str, Size]:
+def sizes(family: Family) -> dict[str, MechanismSize]:
     """All sizes of a family by name: of the whole, of every member and of every stage."""
     groups: dict[tuple[str, str], list[_Part]] = {}
     for part in _parts(family):
@@ -159,7 +159,7 @@ def _parts(family: Family) -> Iterator[_Part]:
             yield _Part(stage.family, np.arange(stage.columns.start, stage.columns.stop), stage=stage.tail)
 
 
-def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | None:
+def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> MechanismSize | None:
     """Size over several parts together; None where they have no pieces."""
     pieces = tuple(part.of(piece) for part in parts for piece in _PIECES[of.name](part.family))
     if not pieces:
@@ -167,12 +167,12 @@ def _size(of: Output, member: str, stage: str, parts: list[_Part]) -> Size | Non
     where = (f"{member.rstrip('.')}: " if member else "") + (f"stage {stage}: " if stage else "")
     named = Output(f"{member}{of.name}{stage}", of.unit, f"{where}{of.text}")
     squared = of in (ARM_RATIO, PIVOT_DISTANCE)
-    return Size(named, of is not ARM_RATIO, squared, pieces)
+    return MechanismSize(named, of is not ARM_RATIO, squared, pieces)
 
 
-def _links(family: Family) -> list[Piece]:
+def _links(family: Family) -> list[DesignFunction]:
     """Lengths of the moving links; an optional link of length 0 counts as the longest regular link."""
-    found: list[Piece] = []
+    found: list[DesignFunction] = []
     for dimensions in family.every(Dimensions):
         always = [partial(_length, _columns(family, names)) for names in dimensions.links]
         found += always
@@ -180,11 +180,11 @@ def _links(family: Family) -> list[Piece]:
     return found
 
 
-def _ratios(family: Family) -> list[Piece]:
+def _ratios(family: Family) -> list[DesignFunction]:
     return [partial(_quotient, one, other) for one, other in permutations(_links(family), 2)]
 
 
-def _arms(family: Family) -> list[Piece]:
+def _arms(family: Family) -> list[DesignFunction]:
     """Squared distances of a carried point from both joints of its link, over the squared distance of the joints."""
     return [
         partial(_arm, _columns(family, arm.point), _columns(family, arm.link), share)
@@ -194,7 +194,7 @@ def _arms(family: Family) -> list[Piece]:
     ]
 
 
-def _pivots(family: Family) -> list[Piece]:
+def _pivots(family: Family) -> list[DesignFunction]:
     """Squared distances between the centres of all pairs of fixed axes."""
     return [
         partial(_apart, one.at, other.at)
@@ -202,7 +202,7 @@ def _pivots(family: Family) -> list[Piece]:
     ]
 
 
-_PIECES: dict[str, Callable[[Family], list[Piece]]] = {
+_PIECES: dict[str, Callable[[Family], list[DesignFunction]]] = {
     LEAST_LINK.name: _links, LINK_RATIO.name: _ratios, ARM_RATIO.name: _arms, PIVOT_DISTANCE.name: _pivots,
 }  # fmt: skip
 
@@ -218,14 +218,14 @@ def _length(columns: tuple[int, ...], designs: Any) -> Any:
     return np.sqrt(sum(designs[:, k] ** 2 for k in columns))
 
 
-def _present(columns: tuple[int, ...], others: tuple[Piece, ...], designs: Any) -> Any:
+def _present(columns: tuple[int, ...], others: tuple[DesignFunction, ...], designs: Any) -> Any:
     found = _length(columns, designs)
     there = np.stack([other(designs) for other in others])
     longest = np.take_along_axis(there, there.real.argmax(axis=0)[None, :], axis=0)[0]
     return np.where(found.real == 0.0, longest, found)
 
 
-def _quotient(one: Piece, other: Piece, designs: Any) -> Any:
+def _quotient(one: DesignFunction, other: DesignFunction, designs: Any) -> Any:
     return one(designs) / other(designs)
 
 
@@ -236,5 +236,5 @@ def _arm(point: tuple[int, ...], link: tuple[int, ...], share: float, designs: A
     return sum(x**2 for x in apart) / size
 
 
-def _apart(one: Piece, other: Piece, designs: Any) -> Any:
+def _apart(one: DesignFunction, other: DesignFunction, designs: Any) -> Any:
     return ((one(designs) - other(designs)) ** 2).sum(axis=1)

@@ -9,7 +9,7 @@ from sweep.families.base import Event, Family, Output
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.reduction import Mode, Reduction
 from sweep.quantities.box import Box
-from sweep.quantities.dimensions import Size
+from sweep.quantities.dimensions import MechanismSize
 
 BOTH_EXTREMA: tuple[Mode, ...] = (1, -1)
 PLACES = ("phi_ext", "phi_fold", "phi0", "stroke_ratio")
@@ -101,7 +101,7 @@ class Extent(_Meaning):
 class Dimension(_Meaning):
     """A size that follows from the dimensions alone."""
 
-    size: Size
+    size: MechanismSize
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from sweep.families.capabilities import Assembly
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import parts, stem, without_minus
 from sweep.quantities import kinds
-from sweep.quantities.dimensions import Piece
+from sweep.quantities.dimensions import DesignFunction
 from sweep.quantities.resolve import find, resolve
 
 # Least Delta/b^2 at the worst pose of a crank that turns: cos^2 of 89.94 degrees.
@@ -71,7 +71,7 @@ class Measure:
     sign: float = 1.0
     numbers: tuple[str, ...] = ()
     parts: tuple[Measure, ...] = ()
-    pieces: tuple[Piece, ...] = ()
+    pieces: tuple[DesignFunction, ...] = ()
     of: str = ""
 
     @property

@@ -12,7 +12,7 @@ from sweep.families.base import Family, Parameter
 from sweep.families.capabilities import LimitLocus
 from sweep.families.chain import Chain
 from sweep.quantities.limits import Limit
-from sweep.study.file import Faults, Section, Size, StudyFile, holds
+from sweep.study.file import Faults, PositiveLength, Section, StudyFile, holds
 from sweep.study.parameter import Entry, missing_parameter, read_entry
 from sweep.study.space import Axis
 from sweep.synthesis.fit import LineFit
@@ -116,7 +116,7 @@ def _values(entry: Entry) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
 class FitSection(Section):
     """Table [fit]."""
 
-    stroke: Size | None = holds('a length as a text, as "24.5 mm"')
+    stroke: PositiveLength | None = holds('a length as a text, as "24.5 mm"')
     direction: Literal["free", "given"] = holds('"free" or "given"', "free")
 
 

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from sweep.errors import nearest
 from sweep.families.base import Family
 from sweep.quantities.limits import Limit
-from sweep.study.file import Faults, Section, Share, Size, StudyFile, Width, holds
+from sweep.study.file import Faults, PositiveAngle, PositiveLength, Section, Share, StudyFile, holds
 from sweep.study.study import Tolerance
 
 UNITS = {"length": "mm", "angle": "rad"}
@@ -18,8 +18,8 @@ MOST_SAMPLES = 1 << 22  # a machine of a hundred dimensions exceeds the memory b
 class ToleranceSection(Section):
     """Table [tolerance]."""
 
-    lengths: Size | None = holds('a length as a text, as "0.02 mm"')
-    angles: Width | None = holds('an angle as a text, as "0.05 deg"')
+    lengths: PositiveLength | None = holds('a length as a text, as "0.02 mm"')
+    angles: PositiveAngle | None = holds('an angle as a text, as "0.05 deg"')
     robust: Share | None = holds('a share as a text, as "95 %"')
     samples: int | None = holds("a power of two: mechanisms that say the share")
     own: dict[str, str] = holds('of what a pattern names, as { "*.key" = "0.1 deg", "*_tilt" = "0 deg" }', {})

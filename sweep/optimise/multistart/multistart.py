@@ -44,7 +44,7 @@ LEAST_GAIN = 1e-9  # smallest relative gain of such a step
 Tell = Callable[[int, int, float], None]
 
 
-class Search(NamedTuple):
+class SearchOutcome(NamedTuple):
     """Results of a search, best first, their survey, and the problem with its final bounds."""
 
     results: list[Result]
@@ -87,7 +87,7 @@ def explore(
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
     tell: Tell | None = None,
-) -> Search:
+) -> SearchOutcome:
     """Search from one group of starts after the other until the survey of the basins suffices.
 
     Parameters
@@ -154,7 +154,7 @@ def explore(
             signal.raise_signal(signal.SIGTERM)
     if ending == "time" and (interrupt.signal_number is not None or any(r.ended == "interrupted" for r in results)):
         ending = "interrupted"
-    return Search(ranked(results), survey(problem, searched, results, settings, ending), problem)
+    return SearchOutcome(ranked(results), survey(problem, searched, results, settings, ending), problem)
 
 
 def _count_finished(searched: Sequence[StartGroup], results: Sequence[Result]) -> int:

@@ -49,7 +49,7 @@ NARROW = 0.1  # factor on the size of the position's limits with margins, which 
 FREE = 1e3  # bound on a deviation without a limit, in strokes
 
 
-class _Curve(NamedTuple):
+class _CurveRow(NamedTuple):
     """Row ``sign * output <= bound`` in units of ``size``: at every pose, at an end of the output, or for its range."""
 
     output: str
@@ -135,13 +135,13 @@ class PoseRows:
             codes |= {along: ALONG + 2 * order, across: ACROSS + 2 * order}
         return codes
 
-    def _limits(self) -> list[_Curve]:
+    def _limits(self) -> list[_CurveRow]:
         """Return the rows: the objective with both signs, rotatability, then the limits that these curves give."""
         linear, codes = self.linear, self._codes()
         wanted = linear.guide.across[linear.wanted] if linear.straight else linear.wanted
         deviation = linear.guide.across[linear.position]
-        curves = [_Curve(wanted, sign, 0.0, 1.0) for sign in (1.0, -1.0)]
-        curves += [_Curve(name, -1.0, -ROTATABLE_MARGIN, 1.0) for name, code in codes.items() if code < ANGLE]
+        curves = [_CurveRow(wanted, sign, 0.0, 1.0) for sign in (1.0, -1.0)]
+        curves += [_CurveRow(name, -1.0, -ROTATABLE_MARGIN, 1.0) for name, code in codes.items() if code < ANGLE]
         for limit in linear.problem.limits:
             if not limit.output.startswith("rotatable"):
                 quantity = measure(self.family, limit.output, linear.problem.window)
@@ -152,7 +152,7 @@ class PoseRows:
             curves = [c._replace(size=NARROW * c.size) if c.output == linear.position else c for c in curves]
         return [curve for curve in curves if curve.output in codes]
 
-    def _task(self, curves: Sequence[_Curve]) -> Task:
+    def _task(self, curves: Sequence[_CurveRow]) -> Task:
         linear, problem, codes = self.linear, self.linear.problem, self._codes()
         curve_codes = [codes[curve.output] for curve in curves]
         if linear.sigma is not None:
@@ -271,7 +271,7 @@ def in_threads(task: Callable[[T], None], parts: Iterable[T], jobs: int) -> None
             pass
 
 
-def _rows_of(quantity: Measure, bound: float, upper: bool, deviation: str) -> list[_Curve]:
+def _rows_of(quantity: Measure, bound: float, upper: bool, deviation: str) -> list[_CurveRow]:
     """Return the rows for one side of a limit, in inner values; none if poses do not give them."""
     if quantity.kind not in ("max", "min", "max_abs", "range"):
         return []
@@ -281,11 +281,11 @@ def _rows_of(quantity: Measure, bound: float, upper: bool, deviation: str) -> li
     for series in quantity.series:
         curve_size = size / DEVIATION if series.output == deviation else size
         if quantity.kind == "range":
-            curves.append(_Curve(series.output, side, side * bound, curve_size, RANGE))
+            curves.append(_CurveRow(series.output, side, side * bound, curve_size, RANGE))
         elif quantity.kind == "max_abs":
-            curves += [_Curve(series.output, sign, bound, curve_size) for sign in (1.0, -1.0)] if upper else []
+            curves += [_CurveRow(series.output, sign, bound, curve_size) for sign in (1.0, -1.0)] if upper else []
         else:
             everywhere = (side * quantity.sign > 0.0) == (quantity.kind == "max")
             at = EVERY if everywhere else HIGHEST if quantity.kind == "max" else LOWEST
-            curves.append(_Curve(series.output, side * quantity.sign, side * bound, curve_size, at))
+            curves.append(_CurveRow(series.output, side * quantity.sign, side * bound, curve_size, at))
     return curves
