@@ -15,8 +15,7 @@ from sweep.families.base import Array, Parameter
 if TYPE_CHECKING:
     import pandas as pd
 
-    Table: TypeAlias = pd.DataFrame | Mapping[str, Any]
-
+Table: TypeAlias = "pd.DataFrame | Mapping[str, Any]"
 
 FORMS = (
     "a DataFrame of pandas, or a dict of columns; most other tables become one by .to_pandas(), "

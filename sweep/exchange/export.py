@@ -9,7 +9,6 @@ import csv
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.poses import evaluate
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import Table, design_matrix
 from sweep.exchange.dxf import write_dxf
 from sweep.exchange.glb import write_glb
 from sweep.exchange.mjcf import METRES, write_mjcf
@@ -28,9 +27,6 @@ from sweep.families import family as find_family
 from sweep.families.base import Family, Interval, Turn, equal_steps
 from sweep.families.machines.machine import Machine
 from sweep.quantities.units import speed_given
-
-if TYPE_CHECKING:
-    from sweep.evaluation.tables import Table
 
 
 def write_hardpoints(mechanism: Mechanism, design: Table, path: Path, phi: float, unit: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +12,10 @@ from numpy.typing import NDArray
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part, parts
 from sweep.evaluation.statuses import meaning
-from sweep.evaluation.tables import design_matrix
+from sweep.evaluation.tables import Table, design_matrix
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Array, Interval, March, equal_steps
-
-if TYPE_CHECKING:
-    from sweep.evaluation.tables import Table
 
 STEPS = 720  # steps of a march from which one pose is taken
 GAP = 0.25  # gap between two frames side by side, relative to the larger one

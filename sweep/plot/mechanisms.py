@@ -16,6 +16,7 @@ from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.cyclogram import cyclogram as table
 from sweep.evaluation.joints import parts
 from sweep.evaluation.poses import evaluate, pose_wants
+from sweep.evaluation.tables import Table
 from sweep.exchange.scene import VIEWS, exists, over, shown_name
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from sweep.evaluation.tables import Table
 
 TURN = 360.0
 BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, relative to a row

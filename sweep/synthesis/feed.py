@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
 from kernels.families import feed as kernels
 from sweep.errors import InputError
-from sweep.evaluation.tables import numbers, one_design, refuse_rows
+from sweep.evaluation.tables import Table, numbers, one_design, refuse_rows
 from sweep.families import family
 from sweep.families.base import Array
-
-if TYPE_CHECKING:
-    from sweep.evaluation.tables import Table
 
 Norm = Literal["squares", "largest"]
 

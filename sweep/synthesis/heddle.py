@@ -10,13 +10,12 @@ import numpy as np
 from kernels import status as st
 from kernels.synthesis import heddle as kernels
 from sweep.errors import InputError
-from sweep.evaluation.tables import Sheet, design_matrix, index_of, refuse_rows
+from sweep.evaluation.tables import Sheet, Table, design_matrix, index_of, refuse_rows
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.evaluation.tables import Table
 
 Mode = Literal["exact", "printed"]
 ANGLES = {"mu", "xi_1", "xi_2", "lever_angle_1", "lever_angle_2", "lever_swing"}

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +21,9 @@ from kernels import synthesis as kernels
 from kernels.synthesis import acceptance
 from kernels.types import TWO_PI, Status
 from sweep.errors import InputError, nearest
-from sweep.evaluation.tables import design_matrix, refuse_rows
+from sweep.evaluation.tables import Table, design_matrix, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Array, Columns, Parameter
-
-if TYPE_CHECKING:
-    from sweep.evaluation.tables import Table
-
 
 ARC_ENDS = 8
 

@@ -18,7 +18,7 @@ from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians, plain_names
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import Sheet, design_matrix, index_of, parameter_units, refuse_rows
+from sweep.evaluation.tables import Sheet, Table, design_matrix, index_of, parameter_units, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
 from sweep.synthesis.locus import Locus, LocusSolutions, locus
@@ -26,7 +26,6 @@ from sweep.synthesis.locus import Locus, LocusSolutions, locus
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.evaluation.tables import Table
 
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
 _EXACT = Accuracy(target=1e-12)

@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels.families import eyelet
 from sweep.errors import InputError
-from sweep.evaluation.tables import design_matrix, numbers, parameter_units, refuse_rows
+from sweep.evaluation.tables import Table, design_matrix, numbers, parameter_units, refuse_rows
 from sweep.families import family
 from sweep.families.base import Array
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
-    from sweep.evaluation.tables import Table
 
 # The columns of kernels.families.eyelet.length_sensitivities, in the order of the design matrix.
 SOUGHT = ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sweep.errors import InputError
+from sweep.evaluation.tables import Table
 from sweep.evaluation.thread.rows import Sheet, columns_of
 from sweep.families.base import Array, Parameter
 from sweep.families.machines.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
@@ -16,7 +17,6 @@ from sweep.families.machines.thread_balance import ALPHA, BENDING, BETA, COUNT, 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from sweep.evaluation.tables import Table
 
 CONTOUR = ("alpha", "beta", "B")
 SPEED = ("K", "n")
