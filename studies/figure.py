@@ -30,4 +30,4 @@ def print_table(table: pd.DataFrame, form: str, missing: str = "NaN") -> None:
 def save_chart(folder: Path, name: str, chart: Callable[[], Figure]) -> None:
     """Write a chart as figures/NAME.svg and print its path."""
     with house_style():
-        print(save(chart(), folder / "figures" / f"{name}.svg").path)  # noqa: T201
+        print(save(chart(), folder / "figures" / f"{name}.svg"))  # noqa: T201

@@ -13,7 +13,7 @@ from studies.accuracy.measured import Measured
 from studies.accuracy.prices import GRID, REFINED, SAMPLES, TARGETS
 from studies.accuracy.subjects import ORDINARY
 from studies.accuracy.tables import duration, power
-from sweep.report.figures import QUIET, Saved, house_style, new_figure, save
+from sweep.report.figures import QUIET, house_style, new_figure, save
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,7 +28,7 @@ LEAST = 1e-16
 USUAL = 360.0
 
 
-def draw_prices(m: Measured, folder: Path) -> list[Saved]:
+def draw_prices(m: Measured, folder: Path) -> list[Path]:
     """Draw the headline figure and the two lists."""
     with house_style():
         figures = {"accuracy": headline(m.families, m.peers)}

@@ -118,7 +118,7 @@ def main() -> None:
     print(points.to_string(index=False, float_format="{:.5g}".format))  # noqa: T201
     with house_style():
         picture = chart(points, pd.read_csv(folder / "price.csv"))
-        print(save(picture, folder / "figures" / "front.svg").path)  # noqa: T201
+        print(save(picture, folder / "figures" / "front.svg"))  # noqa: T201
 
 
 if __name__ == "__main__":

@@ -6,7 +6,6 @@ import base64
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -19,14 +18,6 @@ if TYPE_CHECKING:
 OPTIMUM, REFERENCE, LIMIT, QUIET = "#1f5aa6", "#c8551b", "#b3261e", "#8a8f98"
 WIDTH = 9.6  # inches, the full text width of the page
 NARROW = 4.6  # inches; narrow enough to read bars and their names on a telephone
-
-
-@dataclass(frozen=True)
-class Saved:
-    """A saved figure, and the same bytes as a data URI for the page."""
-
-    path: Path
-    uri: str
 
 
 @contextmanager
@@ -50,12 +41,12 @@ def new_figure(width: float, height: float, layout: Literal["constrained"] | Non
     return figure
 
 
-def save(figure: Figure, path: Path) -> Saved:
-    """Write an SVG that depends on nothing but its data, without date and random identifiers."""
+def save(figure: Figure, path: Path) -> Path:
+    """Write an SVG that depends on nothing but its data, without date and random identifiers; return its path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     path.write_text(smaller(path.read_text("utf-8")), "utf-8")
-    return drawn_before(path)
+    return path
 
 
 def smaller(text: str) -> str:
@@ -71,10 +62,9 @@ def smaller(text: str) -> str:
     return re.sub(r"(<svg[^>]*>)", rf"\1\n<style>{rules}</style>", text, count=1)
 
 
-def drawn_before(path: Path) -> Saved:
-    """Return a figure that was saved earlier."""
-    encoded = base64.b64encode(path.read_bytes()).decode("ascii")
-    return Saved(path, f"data:image/svg+xml;base64,{encoded}")
+def data_uri(path: Path) -> str:
+    """Return a saved figure as a data URI for the page."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def crank_axis(axes: Axes, label: str) -> None:

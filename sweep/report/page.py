@@ -18,7 +18,7 @@ from sweep.optimise.manufacture.tolerance import COST_SAMPLE, TELLING_GAIN
 from sweep.pages import rendered
 from sweep.report import answer, maps, tables
 from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, gather, read_dataset, row_of
-from sweep.report.figures import drawn_before, house_style, save
+from sweep.report.figures import data_uri, house_style, save
 from sweep.report.front import Front
 from sweep.report.live import embedded, live, moving, scripts_of
 from sweep.report.made import (
@@ -146,7 +146,7 @@ def _threads(data: Dataset, out: Path) -> dict[str, str]:
         return {}
     turn.to_csv(out / "threads.csv", index=False, float_format="%.6g")
     with house_style():
-        return {"threads": save(threads_figure(turn), out / "figures" / "threads.svg").uri}
+        return {"threads": data_uri(save(threads_figure(turn), out / "figures" / "threads.svg"))}
 
 
 def draw(data: Dataset, scanned: Scan, cells: list[Cells], folder: Path) -> dict[str, str]:
@@ -156,7 +156,7 @@ def draw(data: Dataset, scanned: Scan, cells: list[Cells], folder: Path) -> dict
     with house_style():
         drawn = {"map": maps.design_map(data, scanned, cells), "trade-off": maps.trade_off(data, scanned)}
         return {
-            name.replace("-", "_"): save(figure, folder / f"{name}.svg").uri
+            name.replace("-", "_"): data_uri(save(figure, folder / f"{name}.svg"))
             for name, figure in drawn.items()
             if figure is not None
         }
@@ -193,7 +193,7 @@ def own_figures(study: Study, folder: Path) -> list[dict[str, Any]]:
     figures = []
     for entry in study.data.get("report", {}).get("figures", []):
         path = folder / entry["file"]
-        figures.append({**entry, "uri": drawn_before(path).uri if path.exists() else None})
+        figures.append({**entry, "uri": data_uri(path) if path.exists() else None})
     return figures
 
 

@@ -181,7 +181,7 @@ def test_numbers_of_a_saved_figure_are_whole_and_its_places_are_short(tmp_path):
     with house_style():
         figure = new_figure(4.0, 3.0)
         figure.subplots().set_xticks([0.0, 0.025, 0.125])
-        text = save(figure, tmp_path / "x.svg").path.read_text()
+        text = save(figure, tmp_path / "x.svg").read_text()
     assert all(f">{number}</text>" in text for number in ("0.000", "0.025", "0.125"))
     assert not re.search(r"\d\.\d{3}", " ".join(re.findall(r"<[^>]*>", text)))
 
