@@ -16,7 +16,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Bends, Singular, about, bends
+from sweep.families.curve_features import Bends, Singular, Smooth, about, bends
 from sweep.numerics.chebyshev import NODES
 from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, Curves, Top, climbed, fitted, measured, places
 from sweep.quantities.kinds import Request
@@ -113,6 +113,9 @@ def _block(
         allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
         if request.mode == -1:
             _vanish(family, designs[rows], request.pose, top, size)
+            if any(len(known.parts) > 1 and known.of == request.pose for known in family.every(Smooth)):
+                # A magnitude is not below 0, however steep the zero that it passes.
+                np.minimum(top.err, -top.value, out=top.err, where=top.value <= 0.0)
         if family.pose_output[request.pose].jumps:  # piecewise constant: a polynomial only adds rounding
             beside = top.phi[:, None] + NARROWEST * np.array([-1.0, 0.0, 1.0])  # it may jump at the place itself
             near_by, _ = pose_columns(family, designs[rows[top.row]], beside, [request.pose])
