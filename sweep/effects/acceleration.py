@@ -124,9 +124,9 @@ def extremes(
     inertia, slope = floats(compute_loads(grid.even(), frozenset(NEEDED_NAMES[:2])), *NEEDED_NAMES[:2])
     inertia = inertia + grid.inputs["flywheel"][:, None]
     turned = Turned(0.5 * inertia * speed**2, inertia * change + 0.5 * slope * speed**2, even)
-    # What the energy misses, the motor's mean torque misses over a turn; half its share is missed by the speed.
+    # The motor's mean torque misses over a turn what the energy misses; half its share is missed by the speed.
     felt = 0.5 * (np.abs(slope) + grid.inputs["motor_slope"][:, None] / np.abs(speed))
-    shift = known * ((inertia.mean(axis=1)[:, None] + felt) * speed**2 / inertia).max(axis=1)
+    shift = known * ((inertia.mean(axis=1)[:, None] / TWO_PI + felt) * speed**2 / inertia).max(axis=1)
     curves = _curves(grid, turned, status)
     edges = np.tile(np.linspace(0.0, TWO_PI, EVEN + 1), (len(speed), 1))
     row, low, high = np.repeat(np.arange(len(speed)), EVEN), edges[:, :-1].ravel(), edges[:, 1:].ravel()
