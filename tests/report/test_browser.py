@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from click.testing import CliRunner
 
 import sweep
+from sweep.cli import main
 from sweep.report.dataset import chosen
 from sweep.report.page import write_report
 from tests.support.browser import DRAWS, FLAT, launcher, opened, pixels
@@ -231,6 +233,16 @@ def test_reports_of_a_march_of_an_interval_and_without_curves_open(study, spatia
             first = page.evaluate(BALLS)
             page.evaluate(SET, 0.5)
             assert page.evaluate(BALLS) != first
+
+
+def test_cyclogram_of_a_machine_is_whole_on_a_telephone(browser, tmp_path):
+    """Its last 20 degrees were cut off."""
+    members = ("--member", "needle=slider_crank", "--member", "looper=four_bar")
+    assert CliRunner().invoke(main, ["init", "seam", *members, "--into", str(tmp_path)]).exit_code == 0
+    folder = sweep.run(tmp_path / "seam", out=tmp_path / "designs", smoke=True)
+    with opened(browser, write_report(folder).as_uri(), 390) as page:
+        assert page.locator("#cyclogram .turn").count() == 3  # two members and the scale
+        assert page.locator("#cyclogram .table").evaluate("part => part.scrollWidth <= part.clientWidth")
 
 
 def test_without_scripts_the_answer_is_whole(address, browser):
