@@ -89,3 +89,23 @@ def test_negative_control_cycloidal_curve_is_not_the_modified_sine():
     with mp.workdps(30):
         other = naive.rise(2, mp.mpf(0.5) / (mp.pi / 2))
     assert abs(float(other) - row.s) > 1e-3
+
+
+@pytest.mark.parametrize("target", [1e-6, 1e-10, 1e-12])
+@pytest.mark.parametrize("law", [1.0, 2.0, 3.0])
+def test_place_of_the_lever_s_greatest_speed_is_the_middle_of_a_phase_within_its_error(law, target):
+    """Every law is symmetric about the middle of its phase, where its velocity is greatest."""
+    random, n = np.random.default_rng(int(law)), 60
+    rows = {
+        "lift": random.uniform(0.1, 0.6, n), "rise": random.uniform(0.3, 2.0, n), "dwell": random.uniform(0.0, 1.5, n),
+        "fall": random.uniform(0.3, 2.0, n), "start": random.uniform(-6.0, 6.0, n), "law": np.full(n, law),
+        "r0": np.full(n, 3.0), "c": np.full(n, 5.0), "e": np.full(n, 6.0), "branch": random.choice([-1.0, 1.0], n),
+    }  # fmt: skip
+    found = sweep.summarise("cam_lever", rows, ["phi_max_dpsi"], accuracy=target)
+    returns = rows["start"] + rows["rise"] + rows["dwell"] + 0.5 * rows["fall"]
+    place = np.where(rows["branch"] < 0.0, rows["start"] + 0.5 * rows["rise"], returns)
+    off = np.abs(np.remainder(found["phi_max_dpsi"] - place + np.pi, 2.0 * np.pi) - np.pi)
+    known = np.isfinite(found["phi_max_dpsi"].to_numpy())
+    assert known.mean() > 0.8  # at 1e-12 rounding is all there is for some
+    assert (off[known] <= found["err_phi_max_dpsi"][known]).all()
+    assert (found["err_phi_max_dpsi"][known] < 1e-5).all()
