@@ -136,6 +136,20 @@ class Measure:
             return math.copysign(math.sqrt(abs(value)), value)
         return value
 
+    def output_slope(self, inner: float) -> float:
+        """Return the derivative of the output by its inner value."""
+        if self.kind == "minus":
+            return self.parts[0].output_slope(-inner)
+        if self.inner == "pressure":  # inner = -cos^2 of the angle
+            return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
+        if self.inner == "transmission":  # inner = sin^2 of the angle
+            return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), 1e-300)))
+        if self.inner == "ratio":
+            return 2.0 * math.pi / (2.0 * math.pi - inner) ** 2
+        if self.inner == "square":
+            return 0.5 / math.sqrt(abs(inner)) if inner else math.nan
+        return 1.0
+
 
 def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
     """Series of a pose output, limited to the window if one is given."""

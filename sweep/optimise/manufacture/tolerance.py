@@ -19,7 +19,7 @@ from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import Limit, compared, meets
-from sweep.quantities.measures import Measure, measure
+from sweep.quantities.measures import measure
 from sweep.quantities.resolve import output as described
 from sweep.study import Study, Tolerance
 
@@ -127,23 +127,8 @@ def _side_gradients(problem: Problem, design: Array) -> tuple[float, Array, Arra
     jacobian = -model.jacobian(state.fractions, state.form, points)[objective_rows] * model.scale
     tied = jacobian[inner >= inner.max() - TIE * abs(inner.max())]
     level = level_gradients(model.curves, stepped(problem, design, state.fractions), points, program.objective, tied)
-    tied = np.concatenate([tied, level]) * _output_slope(program.objective, float(inner.max()))
+    tied = np.concatenate([tied, level]) * program.objective.output_slope(float(inner.max()))
     return value, tied.min(axis=0), tied.max(axis=0)
-
-
-def _output_slope(measure: Measure, inner: float) -> float:
-    """Return the derivative of the output by its inner value."""
-    if measure.kind == "minus":
-        return _output_slope(measure.parts[0], -inner)
-    if measure.inner == "pressure":  # inner = -cos^2 of the angle
-        return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
-    if measure.inner == "transmission":  # inner = sin^2 of the angle
-        return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), 1e-300)))
-    if measure.inner == "ratio":
-        return 2.0 * math.pi / (2.0 * math.pi - inner) ** 2
-    if measure.inner == "square":
-        return 0.5 / math.sqrt(abs(inner)) if inner else math.nan
-    return 1.0
 
 
 SAMPLES = 2048  # a power of two: only then is a Sobol sample balanced
