@@ -74,7 +74,7 @@ class Scene:
     def motion(self) -> Columns:
         """Pose outputs needed for the family's joint records or links, and for the next stage's crank."""
         tree = self.family.find(LinkTree)
-        needs = set(self._gears if self.after else ())
+        needs = set(self.family.derivatives(self.family.position, 2)[1:] if self.after else ())
         if tree is not None:
             needs.update(tree.needs)
         elif self._joints.moved is None:
@@ -82,11 +82,6 @@ class Scene:
         if self.after:
             needs |= driving_names(self.family, self.after[0].family)
         return self.family.poses(self.designs, self.angles, frozenset(needs))
-
-    @cached_property
-    def _gears(self) -> tuple[str, str]:
-        rate = self.family.derivative_of[self.family.position]
-        return rate, self.family.derivative_of[rate]
 
     @cached_property
     def records(self) -> tuple[Array, Array]:
@@ -161,7 +156,8 @@ class Scene:
     def gear(self) -> tuple[Array, Array]:
         """First and second derivative of the next stage's crank angle with respect to this stage's, (n, m)."""
         kappa = self.after[0].kappa[:, None]
-        first, second = (kappa * np.asarray(self.motion[name], np.float64) for name in self._gears)
+        names = self.family.derivatives(self.family.position, 2)[1:]
+        first, second = (kappa * np.asarray(self.motion[name], np.float64) for name in names)
         return first, second
 
     @cached_property

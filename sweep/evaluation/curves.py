@@ -40,12 +40,12 @@ def coordinate(name: str) -> Coordinate | None:
 def motion_curves(family: Family) -> tuple[str, ...]:
     """List position and derivatives, deviations, pressure angles; of a machine those of its members, and relations."""
     if isinstance(family, Machine):
-        members = [f"{m.name}.{name}" for m in family.members for name in _ladder(m.family, 2)]
+        members = [f"{m.name}.{name}" for m in family.members for name in m.family.derivatives(m.family.position, 2)]
         relations = [r for r in family.relations if r.outputs and _has_loads(family, r)]
         return (*members, *(r.outputs[0].name for r in relations))
     deviations = [o.name for o in family.pose_outputs if o.windowed and not o.stage]
     loops = [loop.pressure_angle for loop in family.every(Assembly)]
-    return (*_ladder(family, 3), *deviations, *loops)
+    return (*family.derivatives(family.position, 3), *deviations, *loops)
 
 
 def _has_loads(machine: Machine, relation: Relation) -> bool:
@@ -61,11 +61,3 @@ def joint_curves(family: Family) -> tuple[str, ...]:
     if isinstance(family, Machine):
         return tuple(f"{m.name}.{point}_{axis}" for m in family.members for point in m.points for axis in AXES)
     return tuple(f"{name}{s.tail}" for s in family.stages for at in s.family.points.values() for name in at if name)
-
-
-def _ladder(family: Family, orders: int) -> list[str]:
-    """List the position and its derivatives up to an order."""
-    names = [family.position]
-    while len(names) <= orders and names[-1] in family.derivative_of:
-        names.append(family.derivative_of[names[-1]])
-    return names

@@ -18,11 +18,9 @@ from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Columns, Family, March
 from sweep.families.capabilities import PresserFoot
-from sweep.families.machines.crossings import SAMPLES, Poses
+from sweep.families.machines.crossings import SAMPLES, Moment, Poses
 from sweep.families.machines.machine import Machine
-from sweep.families.machines.moments import Taking
 from sweep.families.machines.pressing import Pressing
-from sweep.families.machines.triangles import Entering
 from sweep.numerics.events import zeros
 from sweep.quantities.resolve import event_names
 
@@ -182,7 +180,7 @@ def event_angles(family: Family) -> dict[str, str]:
     """Map the name of each event and moment in the cyclogram to the output that is its crank angle."""
     names = {event.name: event_names(family, event)[0] for event in family.events}
     relations: tuple[Any, ...] = getattr(family, "relations", ())
-    names |= {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Taking | Entering)}
+    names |= {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Moment)}
     if family.find(PresserFoot) is not None:
         names |= {end: f"phi_{end}" for end in FLIGHT_ENDS}
     feet = [f"{foot.name}_{end}" for foot in _pressings(family) for end in FLIGHT_ENDS]

@@ -277,6 +277,13 @@ class Family:
             name = lower[name]
         return names
 
+    def derivatives(self, name: str, most: int | None = None) -> list[str]:
+        """List an output and its successive derivatives: all of them, or at most the given number."""
+        names = [name]
+        while names[-1] in self.derivative_of and (most is None or len(names) <= most):
+            names.append(self.derivative_of[names[-1]])
+        return names
+
     @cached_property
     def positions(self) -> Mapping[str, str]:
         """Pose outputs that are the position of a follower, with the number of its stage in a chain."""

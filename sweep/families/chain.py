@@ -235,7 +235,7 @@ def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: froz
     del plan.needed[deepest + 1 :]
     for k, stage in enumerate(stages[:deepest]):
         plan.needed[k] |= driving_names(stage.family, stages[k + 1].family)
-        plan.needed[k] |= set(_position_derivatives(stage.family, plan.order))
+        plan.needed[k] |= set(stage.family.derivatives(stage.family.position, plan.order))
     return plan
 
 
@@ -246,13 +246,6 @@ def driving_names(family: Family, driven: Family) -> set[str]:
     if not turned <= set(family.pose_names):
         return {angle}
     return turned | {angle} if driven.uses_phi else turned
-
-
-def _position_derivatives(family: Family, order: int) -> list[str]:
-    names = [family.position]
-    while len(names) <= order:
-        names.append(family.derivative_of[names[-1]])
-    return names[1:]
 
 
 def _poses(
@@ -299,7 +292,7 @@ def _block(stages: tuple[Stage, ...], plan: _Plan, designs: Array, angles: Angle
         results.append(result)
         if plan.order == 0:
             continue
-        composed = plan.composed if is_last else [_position_derivatives(stage.family, plan.order)]
+        composed = plan.composed if is_last else [stage.family.derivatives(stage.family.position, plan.order)[1:]]
         if k > 0:
             for names in composed:
                 outer: list[Any] = [result[name] for name in names]

@@ -211,9 +211,8 @@ def _orders(family: Family) -> list[str]:
     position = family.pose_output.get(family.position)
     if position is None or not isinstance(family.domain, Turn):
         return []
-    needed, found, name = (3 if position.wraps else 2), 0, family.position
-    while name in family.derivative_of and found < needed:
-        name, found = family.derivative_of[name], found + 1
+    needed = 3 if position.wraps else 2
+    found = len(family.derivatives(family.position, needed)) - 1
     if found == needed:
         return []
     why = "extrema, limit positions, a next stage" if position.wraps else "extrema and limit positions"

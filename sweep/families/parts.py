@@ -179,6 +179,14 @@ class Member:
             return [*(frame.within(first) for frame in inner[:-1]), last]
         return [frame.within(first) for frame in inner]
 
+    def driving(self, most: int) -> list[str]:
+        """Dotted names of the angle that drives it, and of the first derivatives of that angle."""
+        assert self.driver is not None
+        names = [self.driver[1]]
+        for _ in range(most):
+            names.append(self.drives[names[-1]])
+        return [f"{self.driver[0]}.{name}" for name in names]
+
     def own(self, name: str) -> str:
         """Return the family's name for a dotted name; "" for a name of another member."""
         prefix = f"{self.name}."

@@ -159,10 +159,8 @@ def rounding_alone(family: Family, designs: Array, pose: str, values: Array, sca
 
 def order_of(family: Family, pose: str) -> int:
     """Order of derivative of a pose output; 3 for outputs of unknown order, such as magnitudes and forces."""
-    lower = {derivative: of for of, derivative in family.derivative_of.items()}
-    if pose not in lower:
-        return 0 if pose in family.derivative_of else 3
-    return 1 + order_of(family, lower[pose])
+    order = len(family.orders(pose))
+    return order if order or pose in family.derivative_of else 3
 
 
 def tells(discriminant: Array) -> Mask:

@@ -53,13 +53,11 @@ def proven_curves(family: Family, guided: GuidedPoint) -> dict[str, tuple[int, i
     Each maps to 0 for the travel along the line or 1 for the deviation across it, and the order of derivative.
     """
     curves: dict[str, tuple[int, int]] = {}
-    name = family.position
-    for order in range(ORDERS + 1):
+    for order, name in enumerate(family.derivatives(family.position, ORDERS)):
         if order > 0:
             curves[name] = (0, order)
         if name in guided.across:
             curves[guided.across[name]] = (1, order)
-        name = family.derivative_of.get(name, "")
     return curves
 
 

@@ -1,8 +1,12 @@
-"""Roots of pose outputs of many designs at once: extrema first, then one root between neighbours of opposite sign."""
+"""Moments of a machine: roots of pose outputs of many designs at once, and the outputs that are evaluated there.
+
+Extrema are found first, then one root between neighbours of opposite sign.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -14,6 +18,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
+from sweep.families.machines.relations import Relation
 from sweep.numerics.events import bottoms, zeros
 
 if TYPE_CHECKING:
@@ -26,10 +31,6 @@ NEAR = 1e-3  # share of a sample's step: the slope of a polynomial this close to
 
 Places: TypeAlias = dict[str, Any]
 """Crank angles (n,) of the designs by name, "count" and "status"."""
-
-Find: TypeAlias = Callable[["Poses", int, frozenset[str]], Places]
-Read: TypeAlias = Callable[["Machine", Any, Places, frozenset[str]], Columns]
-"""Function that returns outputs, ``status``, and ``steep``, the amplification of rounding (`steepness`)."""
 
 
 @dataclass
@@ -44,42 +45,63 @@ class CrankAngles:
         return CrankAngles(self.row[which], self.phi[which])
 
 
-def step_of(name: str, provides: Sequence[Output], machine: Machine, find: Find, read: Read) -> Step:
-    """Make the machine's own step to outputs that are evaluated at crank angles found by ``find``."""
-    last: dict[str, tuple[bytes, Places]] = {}
+@dataclass(frozen=True)
+class Moment(Relation, ABC):
+    """A relation with the crank angle of a passage, ``phi_NAME``, and the outputs that are evaluated there."""
 
-    def places_of(designs: Array, wanted: frozenset[str], samples: int) -> Places:
-        """Find the places of designs, cached for the last designs: a search needs values, then slopes."""
-        asked = designs.tobytes() + repr((samples, sorted(wanted))).encode()
-        known = last.get(name)
-        if known is None or known[0] != asked:
-            known = last[name] = asked, find(Poses(machine, machine.precise(), designs), samples, wanted)
-        return known[1]
+    @property
+    @abstractmethod
+    def provides(self) -> tuple[Output, ...]:
+        """Design outputs: crank angle of the passage, number of passages, and what is evaluated there."""
 
-    def block(designs: Array, wanted: frozenset[str], samples: int) -> Columns:
-        if not np.iscomplexobj(designs):
-            return read(machine, designs, places_of(designs, wanted, samples), wanted)
-        real = np.ascontiguousarray(designs.real)
-        if (real == real[:1]).all():  # the complex step: one design, perturbed along each variable
-            places = {key: np.repeat(x, len(real)) for key, x in places_of(real[:1], wanted, samples).items()}
-        else:
-            places = places_of(real, wanted, samples)
-        return read(machine, designs, places, wanted)
+    @abstractmethod
+    def find(self, poses: Poses, samples: int, wanted: frozenset[str]) -> Places:
+        """Find the crank angles that the wanted outputs need."""
 
-    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        samples = accuracy.samples or SAMPLES
-        parts = [block(designs[k : k + BLOCK], wanted, samples) for k in range(0, max(len(designs), 1), BLOCK)]
-        found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
-        steep = np.asarray(found.pop("steep"), np.float64)
-        if accuracy.target is not None:
-            rounded = TANGENT * steep * np.abs(designs).max(axis=1, initial=0.0)
-            found |= {f"err_{key}": np.maximum(np.abs(found[key]) * accuracy.target, rounded) for key in wanted}
-        return found
+    @abstractmethod
+    def read(self, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
+        """Evaluate all outputs at these angles, each (n,), ``status``, and ``steep`` (`steepness`).
 
-    def cost(accuracy: Accuracy) -> float:
-        return 2000.0 * (accuracy.samples or SAMPLES)
+        With complex designs the places move too, to first order.
+        """
 
-    return Step(f"passage {name}", tuple(provides), run, work=Work.LONG, cost=cost, analytic=machine.analytic)
+    def step(self, machine: Machine) -> Step:
+        """Make the machine's own step to the outputs of the moment."""
+        last: dict[str, tuple[bytes, Places]] = {}
+
+        def places_of(designs: Array, wanted: frozenset[str], samples: int) -> Places:
+            """Find the places of designs, cached for the last designs: a search needs values, then slopes."""
+            asked = designs.tobytes() + repr((samples, sorted(wanted))).encode()
+            known = last.get(self.name)
+            if known is None or known[0] != asked:
+                found = self.find(Poses(machine, machine.precise(), designs), samples, wanted)
+                known = last[self.name] = asked, found
+            return known[1]
+
+        def block(designs: Array, wanted: frozenset[str], samples: int) -> Columns:
+            if not np.iscomplexobj(designs):
+                return self.read(machine, designs, places_of(designs, wanted, samples), wanted)
+            real = np.ascontiguousarray(designs.real)
+            if (real == real[:1]).all():  # the complex step: one design, perturbed along each variable
+                places = {key: np.repeat(x, len(real)) for key, x in places_of(real[:1], wanted, samples).items()}
+            else:
+                places = places_of(real, wanted, samples)
+            return self.read(machine, designs, places, wanted)
+
+        def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+            samples = accuracy.samples or SAMPLES
+            parts = [block(designs[k : k + BLOCK], wanted, samples) for k in range(0, max(len(designs), 1), BLOCK)]
+            found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
+            steep = np.asarray(found.pop("steep"), np.float64)
+            if accuracy.target is not None:
+                rounded = TANGENT * steep * np.abs(designs).max(axis=1, initial=0.0)
+                found |= {f"err_{key}": np.maximum(np.abs(found[key]) * accuracy.target, rounded) for key in wanted}
+            return found
+
+        def cost(accuracy: Accuracy) -> float:
+            return 2000.0 * (accuracy.samples or SAMPLES)
+
+        return Step(f"passage {self.name}", self.provides, run, work=Work.LONG, cost=cost, analytic=machine.analytic)
 
 
 def steepness(speed: Any, *slopes: Any) -> Array:

@@ -13,19 +13,16 @@ from kernels.types import Array
 from sweep.errors import InputError, choices
 from sweep.families.base import Angles, Event, of_family
 from sweep.families.curve_features import Bends, Switches, of_table
-from sweep.families.machines.crossings import SAMPLES, Poses, moved
-from sweep.families.machines.moments import Taking
-from sweep.families.machines.passages import passages
+from sweep.families.machines.crossings import SAMPLES, Moment, Poses, moved
 from sweep.families.machines.thread_balance import ThreadBalance
 from sweep.families.machines.thread_way import PHI
-from sweep.families.machines.triangles import Entering, entries
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
 MOST = 65536  # designs whose events are cached
 
-Happening = Event | Taking | Entering
+Happening = Event | Moment
 
 
 def happenings(machine: Machine) -> dict[str, Happening]:
@@ -58,7 +55,7 @@ def check_happenings(machine: Machine) -> None:
 
 
 def _every(machine: Machine) -> dict[str, Happening]:
-    found: dict[str, Happening] = {r.name: r for r in machine.relations if isinstance(r, Taking | Entering)}
+    found: dict[str, Happening] = {r.name: r for r in machine.relations if isinstance(r, Moment)}
     return found | {event.name: event for event in machine.events}
 
 
@@ -147,8 +144,9 @@ def _search(machine: Machine, events: dict[str, Happening], designs: Array) -> A
         if isinstance(event, Event):
             now, phi = poses.first(event.of, event.level, 1.0 if event.rising else -1.0)
         else:
-            find: Any = passages if isinstance(event, Taking) else entries
-            columns = find(event, machine, poses, SAMPLES)
+            columns: dict[str, Any] = dict(
+                event.read(machine, designs, event.find(poses, SAMPLES, frozenset()), frozenset())
+            )
             now, phi = columns["status"], columns[f"phi_{name}"]
         status = np.where(status == OK, now, status)
         found.append(phi)

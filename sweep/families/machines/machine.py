@@ -18,16 +18,18 @@ from sweep.families.chain import magnitude
 from sweep.families.curve_features import of_members, on_part
 from sweep.families.frames import Frame
 from sweep.families.machines.happenings import bends_of_threads, event_angles, switches_of_threads
-from sweep.families.machines.main_shaft import ShaftTorque, speed_of
+from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.moments import Taking
-from sweep.families.machines.passages import taking_step
 from sweep.families.machines.pressing import Pressing
 from sweep.families.machines.relations import EventValue, Relation, Timing
-from sweep.families.machines.sewing import Sewing, sewing_step
-from sweep.families.machines.shaking import Shaking, orders_of, refused
-from sweep.families.machines.triangles import Entering, entering_step
+from sweep.families.machines.sewing import Sewing
+from sweep.families.machines.shaking import Shaking, refused
+from sweep.families.machines.triangles import Entering
 from sweep.families.parts import Member
 from sweep.families.sites import AXES
+
+# Relations with a step of their own, in the order in which these run.
+WITH_STEP: tuple[type[Relation], ...] = (Taking, Entering, Sewing, ShaftTorque, Shaking, Pressing)
 
 
 @dataclass(frozen=True)
@@ -141,13 +143,8 @@ def _built(machine: Machine, members: tuple[Member, ...]) -> Machine:
     smooth = (one for r in sums for one in r.smooth)
     known = (*found.capabilities, *switches_of_threads(found), *bends_of_threads(found), *smooth)
     found = replace(found, poses=partial(_poses, found), precise_poses=precise, capabilities=known)
-    steps = [taking_step(r, found) for r in machine.relations if isinstance(r, Taking)]
-    steps += [entering_step(r, found) for r in machine.relations if isinstance(r, Entering)]
-    steps += [sewing_step(r, found) for r in machine.relations if isinstance(r, Sewing)]
-    steps += [speed_of(r, found) for r in machine.relations if isinstance(r, ShaftTorque)]
-    steps += [orders_of(r, found) for r in machine.relations if isinstance(r, Shaking)]
-    steps += [r.step(found) for r in machine.relations if isinstance(r, Pressing)]
-    return replace(found, steps=tuple(steps))
+    steps = [r.step(found) for kind in WITH_STEP for r in machine.relations if isinstance(r, kind)]
+    return replace(found, steps=tuple(step for step in steps if step is not None))
 
 
 def _outputs(placed: list[Member]) -> list[Output]:
@@ -270,12 +267,8 @@ def _driving(member: Member, own: frozenset[str]) -> set[str]:
     """Names of the driver's outputs that a member needs: its angle, and derivatives for the member's outputs."""
     if member.driver is None or not own:
         return set()
-    driver, output = member.driver
     most = max((len(member.family.orders(name)) for name in _of_member(member, own).motion), default=0)
-    names = [output]
-    for _ in range(most):
-        names.append(member.drives[names[-1]])
-    return {f"{driver}.{name}" for name in names}
+    return set(member.driving(most))
 
 
 def _member(needs: _OfMember, designs: Array, angles: Angles, found: Mapping[str, Any]) -> dict[str, Any]:
@@ -332,13 +325,9 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
             for order, name in enumerate(names, start=1):
                 result[name] = result[name] * float(m.ratio) ** order
             continue
-        driver, output = m.driver
-        inner = [output]
-        for _ in names:
-            inner.append(m.drives[inner[-1]])
         outer: list[Any] = [result[name] for name in names]
         # a driver that no design varies has a single row
-        whole = [np.broadcast_to(found[f"{driver}.{name}"], outer[0].shape) for name in inner[1:]]
+        whole = [np.broadcast_to(found[name], outer[0].shape) for name in m.driving(len(names))[1:]]
         given: list[Any] = [np.ascontiguousarray(rate) for rate in whole]
         missing: list[Any] = [None] * (3 - len(names))
         chain_rule(np.full(len(outer[0]), float(m.ratio)), *given, *missing, *outer, *missing)

@@ -118,25 +118,24 @@ class ShaftTorque(Relation):
             columns[f"{self.name}_friction"] = lost
         return columns
 
+    def step(self, machine: Machine) -> Step:
+        """Make the machine's step to the speed of its main shaft over the turn."""
+
+        def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+            found = _numbers(self, machine, designs)
+            known = found.pop("energy_error")
+            # The missed energy is a share of the largest energy: of a slow speed it is a larger share.
+            mean, steep = found.pop("mean"), found["fastest"] / found["slowest"]
+            size = {"unevenness": steep / mean, "fastest": np.ones(len(designs)), "slowest": steep}
+            status = found.pop("status")
+            columns: Columns = {f"{self.name}_{key}": values for key, values in found.items()}
+            columns |= {f"err_{self.name}_{key}": known * found["fastest"] * size[key] for key in found}
+            return chosen(columns, wanted, status)
+
+        return Step(f"speed of {self.name}", self.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e5)
+
     def _sum(self, found: Mapping[str, Any], name: str) -> Any:
         return sum(float(one.ratio) ** _RATE[name] * found[one.named(name)] for one in self.driven)
-
-
-def speed_of(shaft: ShaftTorque, machine: Machine) -> Step:
-    """Make the machine's step to the speed of its main shaft over the turn."""
-
-    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        found = _numbers(shaft, machine, designs)
-        known = found.pop("energy_error")
-        # The missed energy is a share of the largest energy: of a slow speed it is a larger share.
-        mean, steep = found.pop("mean"), found["fastest"] / found["slowest"]
-        size = {"unevenness": steep / mean, "fastest": np.ones(len(designs)), "slowest": steep}
-        status = found.pop("status")
-        columns: Columns = {f"{shaft.name}_{key}": values for key, values in found.items()}
-        columns |= {f"err_{shaft.name}_{key}": known * found["fastest"] * size[key] for key in found}
-        return chosen(columns, wanted, status)
-
-    return Step(f"speed of {shaft.name}", shaft.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e5)
 
 
 def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, Any]:

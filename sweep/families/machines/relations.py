@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sweep.errors import InputError, choices
-from sweep.families.base import PER_RADIAN, Output, Parameter
+from sweep.families.base import PER_RADIAN, Output, Parameter, Step
 from sweep.families.sites import AXES
+
+if TYPE_CHECKING:
+    from sweep.families.machines.machine import Machine
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,10 @@ class Relation:
     def rates(self) -> Mapping[str, str]:
         """Derivative by the angle of the main shaft of each pose output that has one."""
         return {}
+
+    def step(self, machine: Machine) -> Step | None:
+        """Make the machine's own step to the design outputs of the relation; None if it has none."""
+        return None
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Names of the members' pose outputs that the wanted outputs need."""

@@ -17,11 +17,10 @@ import numpy as np
 from kernels import status as st
 from kernels.types import Array, Status
 from sweep.families.base import Accuracy, Angles, Columns, Output, Step, Work
-from sweep.families.machines.main_shaft import ShaftTorque, speed_of
+from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.moments import Taking
-from sweep.families.machines.passages import taking_step
 from sweep.families.machines.relations import Relation
-from sweep.families.machines.triangles import Entering, entering_step
+from sweep.families.machines.triangles import Entering
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -128,17 +127,35 @@ class Sewing(Relation):
         rooms[self.taking.name] = np.minimum.reduce([rooms[name] for name in (self.taking.name, *self.ends.values())])
         return rooms, status
 
+    def step(self, machine: Machine) -> Step:
+        """Make the machine's step to the least room of all moments at each speed."""
+
+        def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+            rooms, status = self.rooms(machine, designs, np.array(self.speeds), accuracy)
+            least = np.minimum.reduce(list(rooms.values()))
+            rooms[""] = least
+            status = np.where((status == st.OK) & np.isnan(least).any(axis=1), st.NEVER, status).astype(np.uint8)
+            # size of the lengths whose differences are the rooms
+            most = self.window(machine, designs, np.array(self.speeds))[1].max(axis=1)
+            columns: Columns = {}
+            for name, (part, k) in self.readings.items():
+                room = rooms[self.ends.get(part, "")][:, k]
+                columns |= {name: room, f"err_{name}": (np.abs(room) + most) * (accuracy.target or 0.0)}
+            return columns | {"status": status}
+
+        return Step(f"sewing {self.name}", self.numbers, run, work=Work.LONG, cost=lambda accuracy: 3e6)
+
     def _moments(self, machine: Machine, designs: Array, accuracy: Accuracy, status: Status) -> dict[str, Array]:
         """Compute rise and room of A without its window, and margins of B and C, (n,); update the status."""
         name, (least, most) = self.taking.name, self.clearance
         names = [f"{name}_{key}" for key in ("rise", "clearance", "above_eye", "below_scarf_end")]
-        a = taking_step(self.taking, machine).run(designs, frozenset(names), accuracy)
+        a = self.taking.step(machine).run(designs, frozenset(names), accuracy)
         rise, clearance, above, below = (np.asarray(a[key], np.float64) for key in names)
         found = {"rise": rise, name: np.minimum.reduce([clearance - least, most - clearance, above, below])}
         parts = {name: a}
         for one in self.entering:
             margin = f"{one.name}_margin"
-            parts[one.name] = entering_step(one, machine).run(designs, frozenset({margin}), accuracy)
+            parts[one.name] = one.step(machine).run(designs, frozenset({margin}), accuracy)
             found[one.name] = np.asarray(parts[one.name][margin], np.float64)
         for key, part in parts.items():
             lost = (status == st.OK) & np.isnan(found[key])
@@ -150,7 +167,7 @@ class Sewing(Relation):
         if self.shaft is None:
             return np.ones(len(designs)), np.ones(len(designs)), np.zeros(len(designs), np.uint8)
         names = [f"{self.shaft.name}_{key}" for key in ("slowest", "fastest")]
-        found = speed_of(self.shaft, machine).run(designs, frozenset(names), accuracy)
+        found = self.shaft.step(machine).run(designs, frozenset(names), accuracy)
         column = machine.parameter_names.index(self.shaft.driven[0].named("speed"))
         mean = np.abs(designs[:, column]) / abs(self.shaft.driven[0].ratio)
         slow, fast = (np.asarray(found[key], np.float64) / mean for key in names)
@@ -175,7 +192,7 @@ class Sewing(Relation):
         moved = designs.copy()
         moved[:, own] = speed * member.ratio
         phi = f"phi_{self.taking.name}"
-        at = np.asarray(taking_step(self.taking, machine).run(designs, frozenset({phi}), accuracy)[phi], np.float64)
+        at = np.asarray(self.taking.step(machine).run(designs, frozenset({phi}), accuracy)[phi], np.float64)
         poses = machine.poses(moved, Angles.of(at[:, None]), frozenset((bent, rate)))
         # an angle of the main shaft: sense and ratio of the crank convert it to one of the key or offset
         ahead = np.asarray(poses[bent], np.float64)[:, 0] / np.asarray(poses[rate], np.float64)[:, 0]
@@ -183,22 +200,3 @@ class Sewing(Relation):
         moved = designs.copy()
         moved[:, phase] += ahead * sign
         return moved
-
-
-def sewing_step(sewing: Sewing, machine: Machine) -> Step:
-    """Make the machine's step to the least room of all moments at each speed."""
-
-    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        rooms, status = sewing.rooms(machine, designs, np.array(sewing.speeds), accuracy)
-        least = np.minimum.reduce(list(rooms.values()))
-        rooms[""] = least
-        status = np.where((status == st.OK) & np.isnan(least).any(axis=1), st.NEVER, status).astype(np.uint8)
-        # size of the lengths whose differences are the rooms
-        most = sewing.window(machine, designs, np.array(sewing.speeds))[1].max(axis=1)
-        columns: Columns = {}
-        for name, (part, k) in sewing.readings.items():
-            room = rooms[sewing.ends.get(part, "")][:, k]
-            columns |= {name: room, f"err_{name}": (np.abs(room) + most) * (accuracy.target or 0.0)}
-        return columns | {"status": status}
-
-    return Step(f"sewing {sewing.name}", sewing.numbers, run, work=Work.LONG, cost=lambda accuracy: 3e6)

@@ -157,6 +157,27 @@ class Shaking(Relation):
         moments = with_size(self._moment, moment, wanted) if self._turning(wanted) else {}
         return with_size(self.name, force, wanted) | moments
 
+    def step(self, machine: Machine) -> Step:
+        """Make the machine's step to the first orders of its self."""
+
+        def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
+            asked = [o.name for o in self.numbers if o.name in wanted]
+            least = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked])
+
+            def on_grid(rows: NDArray[np.intp], samples: int) -> tuple[dict[str, Array], Status]:
+                codes, amplitudes = _amplitudes(machine, designs[rows], asked, samples)
+                found: dict[str, Array] = {}
+                for name, (value, err, size) in amplitudes.items():
+                    found |= {name: value, f"err_{name}": err}
+                    if accuracy.target is not None:
+                        codes[(codes == st.OK) & ~(err <= accuracy.target * size)] = st.NOT_CONVERGED
+                return found, codes
+
+            found, status = on_first_grid(least, GRIDS if accuracy.samples is None else (accuracy.samples,), on_grid)
+            return found | {"status": status}
+
+        return Step(f"orders of {self.name}", self.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e4)
+
     def _about_own(self, one: Shaken, found: Mapping[str, Any]) -> list[Any]:
         """Moment about the origin of the stage's frame, with the couple of the tool's guides."""
         moment = one.vector(found, "shaking_moment")
@@ -189,30 +210,8 @@ def refused(
     return {name: np.where(unfit, np.nan, found[name]) for name in names}
 
 
-def orders_of(shaking: Shaking, machine: Machine) -> Step:
-    """Make the machine's step to the first orders of its shaking."""
-
-    def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-        asked = [o.name for o in shaking.numbers if o.name in wanted]
-        least = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked])
-
-        def on_grid(rows: NDArray[np.intp], samples: int) -> tuple[dict[str, Array], Status]:
-            codes, amplitudes = _amplitudes(shaking, machine, designs[rows], asked, samples)
-            found: dict[str, Array] = {}
-            for name, (value, err, size) in amplitudes.items():
-                found |= {name: value, f"err_{name}": err}
-                if accuracy.target is not None:
-                    codes[(codes == st.OK) & ~(err <= accuracy.target * size)] = st.NOT_CONVERGED
-            return found, codes
-
-        found, status = on_first_grid(least, GRIDS if accuracy.samples is None else (accuracy.samples,), on_grid)
-        return found | {"status": status}
-
-    return Step(f"orders of {shaking.name}", shaking.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e4)
-
-
 def _amplitudes(
-    shaking: Shaking, machine: Machine, designs: Array, asked: Sequence[str], samples: int
+    machine: Machine, designs: Array, asked: Sequence[str], samples: int
 ) -> tuple[Status, dict[str, tuple[Array, Array, Array]]]:
     """Compute the status, and for each order the root mean squares of order, error and whole curve, (n,).
 

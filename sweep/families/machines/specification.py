@@ -229,7 +229,7 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
         f"{m.name}.{o.name}"
         for m in earlier.values()
         for o in m.family.pose_outputs
-        if o.wraps and _derivatives(m.family, o.name) >= DERIVATIVES
+        if o.wraps and len(m.family.derivatives(o.name)) > DERIVATIVES
     ]
     if given not in angles:
         known = ", ".join(["shaft", *angles])
@@ -237,14 +237,6 @@ def _driver(given: object, earlier: Mapping[str, Member], where: str) -> tuple[s
         raise InputError("driver", given, allowed, where)
     member, _, output = str(given).partition(".")
     return member, output
-
-
-def _derivatives(family: Family, output: str) -> int:
-    """Return the number of derivatives of an output that a family gives."""
-    number = 0
-    while output in family.derivative_of:
-        output, number = family.derivative_of[output], number + 1
-    return number
 
 
 def _reading(name: str, table: dict[str, Any], before: Machine) -> EventValue:

@@ -8,16 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from kernels import status as st
 from kernels.types import TWO_PI
-from sweep.families.base import PER_RADIAN, Columns, Output, Step
+from sweep.families.base import PER_RADIAN, Columns, Output
 from sweep.families.machines import crossings
-from sweep.families.machines.relations import Relation
 from sweep.families.machines.segments import cross, dot, minus
 from sweep.families.machines.tools import Spot
 
@@ -36,8 +34,8 @@ TEXTS = {
 
 
 @dataclass(frozen=True)
-class Entering(Relation):
-    """A tip and the plane of a triangle, pose by pose; :func:`entering_step` finds the passage of the tip.
+class Entering(crossings.Moment):
+    """A tip and the plane of a triangle, pose by pose, and the passage of the tip.
 
     Parameters
     ----------
@@ -97,68 +95,59 @@ class Entering(Relation):
             columns[f"{self.name}_dabove"] = slope / size
         return columns
 
+    @property
+    def provides(self) -> tuple[Output, ...]:
+        """Design outputs: the crank angle at which the tip enters the triangle, and the distances there."""
+        name, units = self.name, {"pace": PER_RADIAN}
+        place = "crank angle at which the tip passes the plane of the triangle"
+        count = "passages of the plane in the stated sense and window"
+        return (
+            Output(f"phi_{name}", "rad", place, "(13)"),
+            Output(f"count_{name}", "1", count, "(13)", jumps=True),
+            *(Output(f"{name}_{key}", units.get(key, "length"), text, "(13)") for key, text in TEXTS.items()),
+        )
 
-def entering_step(entering: Entering, machine: Machine) -> Step:
-    """Make the step that finds the crank angle and the distances at which the tip enters the triangle."""
-    name = entering.name
-    place = Output(f"phi_{name}", "rad", "crank angle at which the tip passes the plane of the triangle", "(13)")
-    count = Output(f"count_{name}", "1", "passages of the plane in the stated sense and window", "(13)", jumps=True)
-    units = {"pace": PER_RADIAN}
-    read = (Output(f"{name}_{key}", units.get(key, "length"), text, "(13)") for key, text in TEXTS.items())
-    provides = (place, count, *read)
-    return crossings.step_of(name, provides, machine, partial(_found, entering), partial(_read, entering))
+    def find(self, poses: crossings.Poses, samples: int, wanted: frozenset[str]) -> crossings.Places:
+        """Find the crank angle at which the tip enters, by the method for the passage of a needle."""
+        name, sense, n = self.name, float(self.sense), len(poses.designs)
+        above, dabove = f"{name}_above", f"{name}_dabove"
+        status, (x, slope) = poses.samples([above, dabove], samples)
+        status[(status == st.OK) & np.isnan(slope).any(axis=1)] = st.NO_TRIANGLE
+        x, slope = (np.where((status == st.OK)[:, None], values, np.nan) for values in (x, slope))
+        extremes = poses.turning(dabove, slope)
+        (heights,) = poses.at(extremes.row, extremes.phi, above)
+        roots = poses.roots(extremes, heights, above, dabove, x)
+        (turned,) = poses.at(roots.row, roots.phi, dabove)
+        inside, right = self._within(roots.phi), sense * turned > 0.0
+        count, ways = (np.bincount(roots.row, inside & one, n) for one in (right, ~right))
+        size = np.abs(poses.designs[extremes.row]).max(axis=1, initial=0.0)
+        near = self._within(extremes.phi) & (np.abs(heights) <= crossings.TANGENT * size)
+        found = crossings.verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
+        taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
+        place = crossings.scattered(n, roots.row[taken], roots.phi[taken])
+        places = {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
+        return places | {"fastest": np.abs(slope).max(axis=1)}
 
+    def read(self, machine: Machine, designs: Any, places: crossings.Places, wanted: frozenset[str]) -> Columns:
+        """Evaluate all outputs of the entry, each (n,), and status; complex designs move the crank angle too."""
+        name, status, at = self.name, np.array(places["status"]), places["at"]
+        if np.iscomplexobj(designs):
+            at = crossings.moved(machine, designs, at[:, None], [f"{name}_above"])[:, 0]
+        reads = [f"{name}_dabove", *(f"{name}_to_{side}" for side in SIDES)]
+        found = crossings.outputs_at(machine, designs, {"at": at}, reads)
+        turned, *distances = (found[one]["at"] for one in reads)
+        least = np.minimum.reduce(distances) - self.radius
+        columns: Columns = {f"phi_{name}": at, f"count_{name}": places["count"], f"{name}_margin": least}
+        columns |= {f"{name}_from_{side}": one for side, one in zip(SIDES, distances, strict=True)}
+        columns["steep"] = crossings.steepness(places["fastest"], turned)
+        columns[f"{name}_pace"] = float(self.sense) * turned
+        status[np.real(least) <= -self.radius] = st.WRONG_SIDE
+        status[np.isfinite(places["at"]) & np.isnan(least)] = st.NO_TRIANGLE
+        return columns | {"status": status}
 
-def entries(entering: Entering, machine: Machine, poses: crossings.Poses, samples: int) -> Columns:
-    """Return all outputs of the entry, each (n,), and status."""
-    return _read(entering, machine, poses.designs, _found(entering, poses, samples, frozenset()), frozenset())
-
-
-def _found(entering: Entering, poses: crossings.Poses, samples: int, wanted: frozenset[str]) -> crossings.Places:
-    """Find the crank angle at which the tip enters, by the method for the passage of a needle."""
-    name, sense, n = entering.name, float(entering.sense), len(poses.designs)
-    above, dabove = f"{name}_above", f"{name}_dabove"
-    status, (x, slope) = poses.samples([above, dabove], samples)
-    status[(status == st.OK) & np.isnan(slope).any(axis=1)] = st.NO_TRIANGLE
-    x, slope = (np.where((status == st.OK)[:, None], values, np.nan) for values in (x, slope))
-    extremes = poses.turning(dabove, slope)
-    (heights,) = poses.at(extremes.row, extremes.phi, above)
-    roots = poses.roots(extremes, heights, above, dabove, x)
-    (turned,) = poses.at(roots.row, roots.phi, dabove)
-    inside, right = _within(entering, roots.phi), sense * turned > 0.0
-    count, ways = (np.bincount(roots.row, inside & one, n) for one in (right, ~right))
-    size = np.abs(poses.designs[extremes.row]).max(axis=1, initial=0.0)
-    near = _within(entering, extremes.phi) & (np.abs(heights) <= crossings.TANGENT * size)
-    found = crossings.verdict(status, np.bincount(extremes.row, near, n) > 0, count, ways)
-    taken = np.flatnonzero(inside & right & (found[roots.row] == st.OK))
-    place = crossings.scattered(n, roots.row[taken], roots.phi[taken])
-    places = {"at": place, "count": np.where(status == st.OK, count, np.nan), "status": found}
-    return places | {"fastest": np.abs(slope).max(axis=1)}
-
-
-def _read(
-    entering: Entering, machine: Machine, designs: Any, places: crossings.Places, wanted: frozenset[str]
-) -> Columns:
-    """Return all outputs of the entry, each (n,), and status; complex designs move the crank angle to first order."""
-    name, status, at = entering.name, np.array(places["status"]), places["at"]
-    if np.iscomplexobj(designs):
-        at = crossings.moved(machine, designs, at[:, None], [f"{name}_above"])[:, 0]
-    reads = [f"{name}_dabove", *(f"{name}_to_{side}" for side in SIDES)]
-    found = crossings.outputs_at(machine, designs, {"at": at}, reads)
-    turned, *distances = (found[one]["at"] for one in reads)
-    least = np.minimum.reduce(distances) - entering.radius
-    columns: Columns = {f"phi_{name}": at, f"count_{name}": places["count"], f"{name}_margin": least}
-    columns |= {f"{name}_from_{side}": one for side, one in zip(SIDES, distances, strict=True)}
-    columns["steep"] = crossings.steepness(places["fastest"], turned)
-    columns[f"{name}_pace"] = float(entering.sense) * turned
-    status[np.real(least) <= -entering.radius] = st.WRONG_SIDE
-    status[np.isfinite(places["at"]) & np.isnan(least)] = st.NO_TRIANGLE
-    return columns | {"status": status}
-
-
-def _within(entering: Entering, phi: Any) -> Any:
-    """Return the mask of the angles in the window, modulo a turn."""
-    if entering.window is None:
-        return np.ones(np.shape(phi), np.bool_)
-    start, end = entering.window
-    return np.mod(phi - start, TWO_PI) <= np.mod(end - start, TWO_PI)
+    def _within(self, phi: Any) -> Any:
+        """Return the mask of the angles in the window, modulo a turn."""
+        if self.window is None:
+            return np.ones(np.shape(phi), np.bool_)
+        start, end = self.window
+        return np.mod(phi - start, TWO_PI) <= np.mod(end - start, TWO_PI)
