@@ -21,7 +21,8 @@ from studies.accuracy.timing import seconds
 from studies.accuracy.witness import reference
 from sweep.families import family
 from sweep.families.base import Array
-from sweep.reductions.sampling import Index, pose_columns, turn
+from sweep.numerics.records import Index
+from sweep.reductions.sampling import pose_columns, turn
 
 TARGET = 1e-8
 WRONG_PEAK = 1e-4  # relative difference in height that excludes the right peak

@@ -12,7 +12,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
 from sweep.families.base import Accuracy, Array, Family, Turn
 from sweep.families.chain import Chain
-from sweep.reductions.sampling import Mask
+from sweep.numerics.records import Mask
 
 CHAINS = ("rssr+guide", "rssr+rssr")
 NEAR, WIDE, FAR = 0.02, 0.3, 0.9  # largest share by which a parameter differs from the ordinary design's

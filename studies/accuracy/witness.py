@@ -21,7 +21,8 @@ from kernels.types import TWO_PI
 from studies.accuracy.subjects import measure
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family, March
-from sweep.reductions.sampling import Index, on_closed_turn, pose_columns
+from sweep.numerics.records import Index
+from sweep.reductions.sampling import on_closed_turn, pose_columns
 
 GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one around a location
 ROUNDS = 3  # narrower grids that refine the location of a peak

@@ -17,8 +17,8 @@ from sweep.effects.scene import Scene
 from sweep.families.base import Columns, Output, Turn, floats
 from sweep.families.reduction import REDUCTIONS
 from sweep.numerics.panel_search import PANELS, Curves, Top, climbed, fitted, places
-from sweep.numerics.quadrature import Index, integrate
-from sweep.numerics.records import put
+from sweep.numerics.quadrature import integrate
+from sweep.numerics.records import Index, put
 
 NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 NEEDED = frozenset(NEEDED_NAMES)

@@ -12,9 +12,10 @@ from kernels.linkage.bodies import SLIDE
 from kernels.types import Status
 from sweep.effects import loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
-from sweep.effects.scene import Index, Scene, refuse
+from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Parameter
 from sweep.families.link_tree import LinkJoint, LinkTree
+from sweep.numerics.records import Index
 
 KINDS = {
     "shaft": link_loads.SHAFT,

@@ -18,10 +18,11 @@ from sweep.effects.base import Advice, Bend, Effect, largest
 from sweep.effects.link_loads import rod, tree_of
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
-from sweep.effects.scene import Index, Scene
+from sweep.effects.scene import Scene
 from sweep.families import family
 from sweep.families.base import Array, Output
 from sweep.families.link_tree import LinkJoint, LinkTree
+from sweep.numerics.records import Index
 
 _V, _OMEGA, _ALONG, _PLACE = slice(3, 6), slice(9, 12), slice(15, 18), slice(24, 27)  # of bodies.PER_BODY
 

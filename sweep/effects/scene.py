@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +22,10 @@ from sweep.families.curve_features import samples_of_waves
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
+from sweep.numerics.records import Index
 
 _PER_LINK = (PER_BODY, 3, PER_LINE)
 PART = 4096  # poses of bodies per block where their loads are computed design by design
-
-Rows: TypeAlias = NDArray[np.intp]
-Index: TypeAlias = NDArray[np.int64]
 
 
 class Driven(NamedTuple):
@@ -40,7 +38,7 @@ class Driven(NamedTuple):
     inputs: dict[str, Array]
     curves: Mapping[str, Curve] = {}
 
-    def only(self, rows: Rows) -> Driven:
+    def only(self, rows: Index) -> Driven:
         """Select designs by index."""
         given = {name: x[rows] for name, x in self.inputs.items()}
         return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
@@ -220,15 +218,15 @@ class Scene:
         of_loads = max((curve.samples for curve in self.every_curve), default=0.0)
         return np.where(self.pierces, np.inf, np.maximum(samples_of_waves(self.family, self.designs), of_loads))
 
-    def only(self, rows: Rows) -> Scene:
+    def only(self, rows: Index) -> Scene:
         """Select designs by index; the scene itself if these are all."""
         return self if rows.size == len(self.designs) else self._of(rows, self.angles.part(rows))
 
-    def posed(self, rows: Rows, phi: Array) -> Scene:
+    def posed(self, rows: Index, phi: Array) -> Scene:
         """Select designs by index, perhaps repeatedly, at their own crank angles (k, m)."""
         return self._of(rows, Angles.of(phi))
 
-    def _of(self, rows: Rows, angles: Angles) -> Scene:
+    def _of(self, rows: Index, angles: Angles) -> Scene:
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 

@@ -11,27 +11,30 @@ import numpy as np
 from kernels import status as st
 from kernels.curves.periodic import turn_extremes
 from kernels.types import Status
-from sweep.effects.scene import Rows, Scene, take_over
+from sweep.effects.scene import Scene, take_over
 from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.poses import chosen
 from sweep.families.reduction import REDUCTIONS
 from sweep.numerics.even_grids import on_first_grid
+from sweep.numerics.records import Index
 
 RESOLVED = 1e-9
 NONE: Mapping[str, Array] = MappingProxyType({})
 
-Solver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Status]]
+GridSolver: TypeAlias = Callable[[Scene, Array, bool], tuple[dict[str, Array], Status]]
 """``solve(scene, phi, last)``: design outputs (n,) and curves (n, m) at phi from a scene on a grid, status (n,)."""
 
 
-def on_finer_grids(scene: Scene, phi: Array, grids: Sequence[int], solve: Solver) -> tuple[dict[str, Array], Status]:
+def on_finer_grids(
+    scene: Scene, phi: Array, grids: Sequence[int], solve: GridSolver
+) -> tuple[dict[str, Array], Status]:
     """Solve every design on the first of the ``grids`` that resolves it.
 
     ``phi`` is (n, m) or (1, m); designs for which ``solve`` returns NOT_CONVERGED are solved again on the next grid.  A
     grid that does not resolve the loads is skipped, except the last one.
     """
 
-    def on_grid(rows: Rows, size: int) -> tuple[dict[str, Array], Status]:
+    def on_grid(rows: Index, size: int) -> tuple[dict[str, Array], Status]:
         own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
         return solve(scene.only(rows).on_grid(size), own, size == grids[-1])
 

@@ -25,11 +25,12 @@ from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member
+from sweep.numerics.records import Index
 from sweep.quantities.kinds import Extent, GeneralRoute, LargestLength, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import Index, on_closed_turn
+from sweep.reductions.sampling import on_closed_turn
 from sweep.reductions.steps import applying_step, beyond_motion, group_ns
 from sweep.reductions.turn import margin_group
 

@@ -66,7 +66,7 @@ class PressureEllipse:
 
 
 @dataclass(frozen=True)
-class Curve:
+class FusedOutput:
     """A pose output of a fused chain: a derivative of a x + b y + c of the motion of its last stage.
 
     ``order`` is that of the derivative by the crank angle, 0, 1 or 2; ``made_of(designs)``, (n, 3), returns a, b, c
@@ -92,7 +92,7 @@ class InSeries:
     """
 
     form: Form
-    curves: Mapping[str, Curve]
+    curves: Mapping[str, FusedOutput]
     components: Mapping[str, str]
     opening: Callable[[Array, NDArray[np.uint8], Array], None] | None = None
     matrix: DesignMap | None = None

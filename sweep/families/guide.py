@@ -124,6 +124,9 @@ def _of_point(axis: str, designs: Array) -> Array:
 
 
 _ALONG, _ACROSS = can.constant(1.0, 0.0, 0.0), can.constant(0.0, 1.0, 0.0)
+_TRAVEL = {name: can.FusedOutput(order, _ALONG) for order, name in enumerate(("s", "ds", "d2s", "d3s"))}
+_DEVIATION = {name: can.FusedOutput(order, _ACROSS) for order, name in enumerate(("dev", "ddev", "d2dev"))}
+_PLACE = {f"{axis}_m": can.FusedOutput(0, partial(_of_point, axis)) for axis in "xy"}
 
 
 def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
@@ -136,14 +139,10 @@ def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
 
 IN_SERIES = can.InSeries(
     guide.FORM,
-    {
-        "s": can.Curve(0, _ALONG), "ds": can.Curve(1, _ALONG), "d2s": can.Curve(2, _ALONG), "d3s": can.Curve(3, _ALONG),
-        "dev": can.Curve(0, _ACROSS), "ddev": can.Curve(1, _ACROSS), "d2dev": can.Curve(2, _ACROSS),
-        "x_m": can.Curve(0, partial(_of_point, "x")), "y_m": can.Curve(0, partial(_of_point, "y")),
-    },
+    _TRAVEL | _DEVIATION | _PLACE,
     {"ds": "x1", "d2s": "x2", "d3s": "x3", "dev": "y0", "ddev": "y1", "d2dev": "y2"},
     opening,
-)  # fmt: skip
+)
 
 FAMILY = Family(
     name="guide",

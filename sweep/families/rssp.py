@@ -135,7 +135,7 @@ def ellipse(designs: Array) -> Array:
 
 
 _NAMES = ("s", "ds", "d2s", "d3s")
-CURVES = {name: can.Curve(order, can.constant(1.0, 0.0, 0.0)) for order, name in enumerate(_NAMES)}
+CURVES = {name: can.FusedOutput(order, can.constant(1.0, 0.0, 0.0)) for order, name in enumerate(_NAMES)}
 COMPONENTS = {"ds": "x1", "d2s": "x2", "d3s": "x3"}
 
 

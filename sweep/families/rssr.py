@@ -283,7 +283,7 @@ def _grid(samples: int) -> tuple[Array, Array]:
 
 
 CURVES = {
-    name: can.Curve(order, can.constant(1.0, 0.0, 0.0))
+    name: can.FusedOutput(order, can.constant(1.0, 0.0, 0.0))
     for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)
 }
 SERIES = can.InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening)

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI, Array
-from sweep.numerics.quadrature import Index
+from sweep.numerics.records import Index
 
 WIDER = 8.0  # ratio of successive distances: a pole beside the nearer end leaves 2.1^-k in the k-th coefficient
 SHORTEST = 1e-11  # distance of a zero [rad] below which its effect falls between two crank angles

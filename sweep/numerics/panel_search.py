@@ -15,8 +15,7 @@ from numpy.polynomial import chebyshev
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Array
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
-from sweep.numerics.quadrature import Index
-from sweep.numerics.records import only
+from sweep.numerics.records import Index, only
 
 PANELS = 64  # first even panels of a turn, besides cuts where a curve may bend
 TAIL = 4  # last coefficients that bound a polynomial's error; for a tent in the middle three of them nearly vanish ...

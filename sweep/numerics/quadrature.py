@@ -10,12 +10,9 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.types import EPS, Array
-
-Index: TypeAlias = NDArray[np.intp]
-Mask: TypeAlias = NDArray[np.bool_]
+from sweep.numerics.records import Index, Mask, only
 
 Integrand: TypeAlias = Callable[[Index, Index, Array], Array]
 """``f(rows, origins, x)``: values (k, 17, q) of the curves ``rows`` (k,) at ``x`` (k, 17); ``origins`` (k,) are the
@@ -80,10 +77,6 @@ class _Panels(NamedTuple):
     err: Array
     idle: Array
 
-    def only(self, which: Mask) -> _Panels:
-        row, origin, *others = self
-        return _Panels(row[which], origin[which], *(column[which] for column in others))
-
 
 def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
     """Integrate n curves over x, each to a relative error.
@@ -114,7 +107,7 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
     count = np.bincount(panels.row, minlength=n)
     for _ in range(PASSES):
         seen[panels.row[~np.isfinite(panels.value).all(axis=1)]] = False
-        panels = panels.only(seen[panels.row])
+        panels = only(panels, seen[panels.row])
         total, err = done.copy(), done_err.copy()
         np.add.at(total, panels.row, panels.value)
         np.add.at(err, panels.row, panels.err)
@@ -125,10 +118,10 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
         narrow = panels.high - panels.low <= 16.0 * EPS * np.abs(panels.high)
         halve = (panels.err > allowed).any(axis=1) & ~noisy & ~narrow & ~settled[panels.row]
         halve &= count[panels.row] < MOST
-        rest = panels.only(~halve)
+        rest = only(panels, ~halve)
         np.add.at(done, rest.row, rest.value)
         np.add.at(done_err, rest.row, rest.err)
-        panels = panels.only(halve)
+        panels = only(panels, halve)
         if not panels.row.size:
             break
         count += np.bincount(panels.row, minlength=n)

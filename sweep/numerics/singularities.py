@@ -12,9 +12,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI, Array
-from sweep.numerics.quadrature import Index
+from sweep.numerics.records import Index
 
-Curve: TypeAlias = Callable[[Index, Array], Array]
+Discriminant: TypeAlias = Callable[[Index, Array], Array]
 """``f(rows, phi)``: values of a discriminant of the designs ``rows`` (k,) at crank angles (k, m), or (1, m) for all."""
 
 SAMPLES = 64  # samples of a discriminant, which is smooth even where the motion is nearly singular
@@ -31,10 +31,6 @@ class Singularities(NamedTuple):
     phi: Array
     rho: Array
 
-    def only(self, which: Index) -> Singularities:
-        """Select designs by index."""
-        return Singularities(self.phi[which], self.rho[which])
-
     def distance(self, phi: Array) -> Array:
         """Distance of the nearest zero from crank angles (n,) or (n, m)."""
         one = phi[:, None] if phi.ndim == 1 else phi
@@ -44,7 +40,7 @@ class Singularities(NamedTuple):
         return nearest.reshape(phi.shape)
 
 
-def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -> Singularities:
+def singularities(discriminants: Sequence[Discriminant], n: int, within: float = FAR) -> Singularities:
     """Find the nearest complex zeros of the discriminants of n designs from their dips over the turn.
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is repeated
@@ -57,7 +53,7 @@ def singularities(discriminants: Sequence[Curve], n: int, within: float = FAR) -
     return Singularities(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def _dips(curve: Curve, n: int, number: int, within: float) -> Singularities:
+def _dips(curve: Discriminant, n: int, number: int, within: float) -> Singularities:
     spacing = TWO_PI / SAMPLES
     turn = np.arange(SAMPLES, dtype=np.float64) * spacing
     # One row of angles for all designs: their cosines and sines are computed once.
@@ -86,7 +82,7 @@ def _elsewhere(n: int, number: int) -> tuple[Array, Array]:
     return np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1)), np.full((n, NEAREST), FAR)
 
 
-def _closer(curve: Curve, row: Index, phi: Array) -> tuple[Array, Array]:
+def _closer(curve: Discriminant, row: Index, phi: Array) -> tuple[Array, Array]:
     """Refine places and distances (k,) of the zeros of designs ``row`` near dips at ``phi`` (k,)."""
     spacing = TWO_PI / SAMPLES
     every, rho, step = np.arange(phi.size), np.full(phi.size, FAR), np.full(phi.size, spacing)

@@ -12,10 +12,11 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Event, Family, Interval
 from sweep.families.names import error_of
 from sweep.numerics.events import zeros
+from sweep.numerics.records import Index
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
 from sweep.reductions.rounding import shaken
-from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn, variable
+from sweep.reductions.sampling import DESIGN_STATUS, blocks, pose_columns, sample_turn, variable
 
 START, LIMIT = 256, 16384  # first number of samples, and the last one before a design is given up
 

@@ -15,12 +15,12 @@ from kernels import status as st
 from kernels.types import Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, about, crossed
-from sweep.numerics.records import put
+from sweep.numerics.records import Mask, put
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
 from sweep.reductions.resolution import series_of
-from sweep.reductions.sampling import Extremum, Mask, blocks
+from sweep.reductions.sampling import Extremum, blocks
 from sweep.reductions.window import Window
 
 OVER = 1e-6  # distance of a limit position from the angle's branch cut [rad] that counts as beyond it
@@ -143,7 +143,7 @@ def _searched(
     window: Window | None, start: int | None = None,
 ) -> tuple[dict[Request, Extremum], Status]:  # fmt: skip
     """Compute `true_extrema` from poses alone, beginning with ``start`` samples; failed designs keep their values."""
-    search = peak_search.Search(family, designs, tuple(requests), target, locate, anywhere, window)
+    search = peak_search.PeakSearch(family, designs, tuple(requests), target, locate, anywhere, window)
     pending, samples = np.arange(len(designs)), start or peak_search.START
     while pending.size:
         for rows in blocks(pending[search.needed(pending) <= samples], samples, len(search.names)):

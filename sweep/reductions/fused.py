@@ -18,17 +18,18 @@ from kernels import status as st
 from kernels.chains.curves import MARGIN
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.capabilities import Assembly, Curve, DesignMap, InSeries, constant
+from sweep.families.capabilities import Assembly, DesignMap, FusedOutput, InSeries, constant
 from sweep.families.chain import Chain
+from sweep.numerics.records import Index, Mask
 from sweep.quantities.kinds import Request
 from sweep.reductions.peak_search import TIE
 from sweep.reductions.refine import SHRINK, Peaks, confirmed, polished
-from sweep.reductions.sampling import Extremum, Index, Mask, pose_columns, turn
+from sweep.reductions.sampling import Extremum, pose_columns, turn
 
 sampling_tables = lru_cache(chains.sampling_tables)
 
 Opened: TypeAlias = tuple[Array, Status, Array]
-Found: TypeAlias = tuple[Extremum, Status, Mask]
+Answer: TypeAlias = tuple[Extremum, Status, Mask]
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class FusedCurve:
     made_of: DesignMap
     scale: DesignMap | None = None
 
-    def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> Found:
+    def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> Answer:
         """Compute the requested extremum of every design, as `extrema` does."""
         return extrema((self,), designs, target, opened)[0]
 
@@ -108,7 +109,9 @@ def together(curve: FusedCurve, requests: Sequence[Request]) -> tuple[FusedCurve
     return (curve, other) if curve.order <= other.order else (other, curve)
 
 
-def extrema(curves: tuple[FusedCurve, ...], designs: Array, target: float, opened: Opened | None = None) -> list[Found]:
+def extrema(
+    curves: tuple[FusedCurve, ...], designs: Array, target: float, opened: Opened | None = None
+) -> list[Answer]:
     """Compute one extremum of every design, or two that share their samples.
 
     Parameters
@@ -213,7 +216,7 @@ def curve_of(family: Family, request: Request, anywhere: bool, mean: bool = Fals
     if output.stage not in ("", str(last.number)) or (request.place and request.pose not in family.derivative_of):
         return None
     # Derivatives with a stage number are not with respect to the crank angle of the chain.
-    curve: Curve | None = forms[-1].curves.get(output.base)
+    curve: FusedOutput | None = forms[-1].curves.get(output.base)
     if curve is None or (output.stage and curve.order > 0):
         return None
     return FusedCurve(family, request, forms, curve.order, curve.made_of)

@@ -15,10 +15,9 @@ import numpy as np
 
 from kernels.types import TWO_PI
 from sweep.families.base import Array
-from sweep.numerics.records import joined, only
+from sweep.numerics.records import Index, Mask, joined, only
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
-from sweep.reductions.sampling import Index, Mask
 
 # Error of the first guess relative to the fall to the next samples above which a maximum is looked at closely: it was
 # 0.04 and 0.1 where two maxima appeared as one; few maxima of smooth curves exceed it.

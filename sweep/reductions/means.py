@@ -18,12 +18,13 @@ from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.curve_features import Switches, about, crossed
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
+from sweep.numerics.records import Index, only
 from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
 from sweep.reductions.resolution import denser, ends, nearest, series_of
 from sweep.reductions.rounding import ALONE, shaken, shaken_anywhere
-from sweep.reductions.sampling import DESIGN_STATUS, Index, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import DESIGN_STATUS, blocks, pose_columns, sample_turn
 
 SAMPLES = 128  # first number of samples of a turn
 NEAR = 0.3  # distance of a singularity [rad] below which panels are used
@@ -94,7 +95,7 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     for rows in np.split(left, range(PANELS_AT_ONCE, left.size, PANELS_AT_ONCE)):
         near = nearest(family, designs[rows], (pose,), NEAR)
         open_ = cut[rows] | (near.rho.min(axis=1, initial=FAR) < NEAR) | ~(err[rows] <= target * mean[rows])
-        edges, rows = turn_edges(near.only(np.flatnonzero(open_)), PANEL), rows[open_]
+        edges, rows = turn_edges(only(near, np.flatnonzero(open_)), PANEL), rows[open_]
         if not rows.size:
             continue
         which = np.flatnonzero(cut[rows])

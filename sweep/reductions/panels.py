@@ -19,13 +19,13 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import Bends, Singular, Smooth, about, bends
 from sweep.numerics.chebyshev import NODES
 from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, Curves, Top, climbed, fitted, measured, places
+from sweep.numerics.records import Index
 from sweep.quantities.kinds import Request
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import ALONE, PLACES, order_of, rounding_by_pieces, shaken_anywhere, singular_share
 from sweep.reductions.sampling import (
     DESIGN_STATUS,
     Extremum,
-    Index,
     blocks,
     continued,
     discriminants,

@@ -12,7 +12,7 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, Switches, about, switches
 from sweep.numerics.panel_search import first_of_equals
-from sweep.numerics.records import joined, only, put
+from sweep.numerics.records import Index, Mask, joined, only, put
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine, rounding
@@ -22,8 +22,6 @@ from sweep.reductions.resolution import MATTERS, broken, denser, nearest
 from sweep.reductions.sampling import (
     DESIGN_STATUS,
     Extremum,
-    Index,
-    Mask,
     continued,
     discriminants,
     jumps,
@@ -48,7 +46,7 @@ TIE = 1e-10  # relative accuracy to which peaks are compared where their places 
 
 
 @dataclass
-class Search:
+class PeakSearch:
     """State of a search: extrema found so far, and number of samples that each design still needs."""
 
     family: Family
@@ -207,7 +205,7 @@ class Search:
             put(peaks, rivals, refine.sharpen(sample, only(peaks, rivals), tolerance, np.full(rivals.size, np.inf)))
         share = self._rounding(turn, candidates, self.guards)
         if self.near is not None:
-            near = self.near.only(turn.rows[candidates.row])
+            near = only(self.near, turn.rows[candidates.row])
             share += rounding.singular_share(near, peaks.phi, self._orders(candidates))
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is None:
@@ -328,7 +326,7 @@ class Search:
             err = np.maximum(err, off[has])
             if self.near is not None:
                 err += np.where(
-                    self.near.only(rows[has]).distance(peaks.phi[chosen]) < CLOSE, refine.VARIES * off[has], 0.0
+                    only(self.near, rows[has]).distance(peaks.phi[chosen]) < CLOSE, refine.VARIES * off[has], 0.0
                 )
         found.err[rows[has]] = err
         moved = np.zeros(rows.size)

@@ -10,8 +10,8 @@ import numpy as np
 from kernels.curves import samples as scan
 from kernels.types import EPS
 from sweep.families.base import Array, Family
-from sweep.numerics.records import only, put
-from sweep.reductions.sampling import Index, Mask, pose_columns
+from sweep.numerics.records import Index, Mask, only, put
+from sweep.reductions.sampling import pose_columns
 
 Sampler: TypeAlias = Callable[[Index, Array], Array]
 """``sample(candidates, phi)``: values (k, m), times their signs, of candidates (k,) at the angles phi (k, m)."""

@@ -20,10 +20,10 @@ from sweep.families import curve_features as features
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import Bends, SingularCurve
 from sweep.numerics.events import near_zeros, sign_changes, with_events
-from sweep.numerics.records import put
-from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Curve, Singularities, crowded, singularities
+from sweep.numerics.records import Index, Mask, only, put
+from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Discriminant, Singularities, crowded, singularities
 from sweep.quantities.kinds import Request
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, blocks, pose_columns, sample_turn
 
 PER_WAVE = 2.0  # waves per turn that the least number of samples resolves
 SHARES = 16.0  # the least number of samples is enough for switches at a distance of a turn over this
@@ -64,7 +64,7 @@ def nearest(family: Family, designs: Array, outputs: Collection[str], within: fl
     """
     curves = features.singular_curves(family.precise(), outputs)
 
-    def of_rows(some: Index, curve: SingularCurve) -> Curve:
+    def of_rows(some: Index, curve: SingularCurve) -> Discriminant:
         return lambda rows, phi: curve(designs[some[rows]], Angles.of(phi))
 
     parts = [
@@ -112,9 +112,9 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     edges = with_events(edges, more, TWO_PI * place / fast[more])
     near = nearest(family, designs, (output,))
     close = np.flatnonzero(near.rho.min(axis=1, initial=FAR) < CLOSE)
-    about = crowded(near.only(close), 1.0)
+    about = crowded(only(near, close), 1.0)
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
-    angles = crowded(near.only(close), LOOK)
+    angles = crowded(only(near, close), LOOK)
     edges = with_events(edges, *_passed(family, designs, (output,), _looked(n, looks, close, angles)))
     for bent in features.bends(family, output):
         edges = with_events(edges, *_bent(bent, designs, _looked(n, BENDING, close, angles)))

@@ -11,11 +11,11 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
-from sweep.numerics.records import only
+from sweep.numerics.records import Index, Mask, only
 from sweep.numerics.singularities import Singularities, crowded
 from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
 from sweep.reductions.resolution import nearest
-from sweep.reductions.sampling import Index, Mask, blocks, pose_columns
+from sweep.reductions.sampling import blocks, pose_columns
 
 TRIES = 3
 PLACES = 32  # a force along what bears none is exactly 0 at five of six poses
@@ -243,7 +243,7 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
     top = (values >= np.roll(values, 1, axis=1)) & (values >= np.roll(values, -1, axis=1))
     row, column = np.nonzero(top & (values >= RIVAL * highest[:, None]))
     row, centre = np.concatenate([row, every]), np.concatenate([angles[row, column], phi])
-    spacing = SPACING * near.only(row).distance(centre)
+    spacing = SPACING * only(near, row).distance(centre)
     around = measured(row, centre[:, None] + spacing[:, None] * AROUND)
     np.maximum.at(highest, row, around.max(axis=1))
     first = first_peaks(centre, spacing, around)

@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
-from typing import NamedTuple, TypeAlias, cast
+from typing import NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
 from sweep.families.base import Angles, Array, Columns, Family, Interval, PoseFunction, of_family
 from sweep.families.capabilities import Assembly
-
-Index: TypeAlias = NDArray[np.int64]
-Mask: TypeAlias = NDArray[np.bool_]
+from sweep.numerics.records import Index, Mask
 
 BLOCK = 2**17  # samples handled at once: a few columns of this length stay in the cache
 UNCLEAR = 0.25  # step of an angle between two poses [turns] from which on it may have gone the other way round

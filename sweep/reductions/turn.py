@@ -12,15 +12,16 @@ from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
 from sweep.errors import MissingInput
 from sweep.families.base import Accuracy, Array, Columns, Family
+from sweep.numerics.records import Index, Mask
 from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
 from sweep.quantities.resolve import STAY, resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import sampled_maxima
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
-from sweep.reductions.sampling import DESIGN_STATUS, Extremum, Index, Mask, blocks, sample_turn, variable
+from sweep.reductions.sampling import DESIGN_STATUS, Extremum, blocks, sample_turn, variable
 from sweep.reductions.window import Window, window_angle
 
-Found: TypeAlias = dict[Request, Extremum]
+Extrema: TypeAlias = dict[Request, Extremum]
 
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
@@ -79,7 +80,7 @@ def limits_and_reductions(
     windowed = part is not None
     wanted = list(dict.fromkeys(r for one in asked for r in requests(family, one, windowed)))
     status = np.zeros(len(designs), np.uint8)
-    found: Found = {}
+    found: Extrema = {}
     for position in dict.fromkeys(family.follower(r.pose) for r in wanted if r.windowed):
         ends = [Request(position, 1), Request(position, -1)]
         more, now = _extrema(family, designs, [r for r in ends if r not in found], accuracy, None)
@@ -100,7 +101,7 @@ def limits_and_reductions(
     return columns
 
 
-def _window(position: str, found: Found, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:
+def _window(position: str, found: Extrema, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:
     """Make the window of a follower whose limit positions are found."""
     if part is None:
         raise MissingInput("window", f"two fractions of the stroke, as {STAY.name} is wanted", "design outputs")
@@ -111,7 +112,7 @@ def _window(position: str, found: Found, accuracy: Accuracy, part: tuple[float, 
 
 def _extrema(
     family: Family, designs: Array, requests: Sequence[Request], accuracy: Accuracy, window: Window | None
-) -> tuple[Found, Status]:
+) -> tuple[Extrema, Status]:
     if not requests:
         return {}, np.zeros(len(designs), np.uint8)
     if accuracy.samples is not None:
@@ -122,7 +123,7 @@ def _extrema(
 
 def sampled_extrema(
     family: Family, designs: Array, requests: Sequence[Request], samples: int, window: Window | None = None
-) -> tuple[Found, Status]:
+) -> tuple[Extrema, Status]:
     """Compute extrema on a grid of ``samples`` equidistant crank angles from 0; nan where the status is not OK.
 
     Errors are not estimated (nan).  A window without a sample in it gives NOT_CONVERGED.
@@ -166,7 +167,7 @@ def _best_samples(
     return rows[column < 0]
 
 
-def _value(family: Family, designs: Array, one: Quantity, found: Found, windowed: bool) -> tuple[Array, Array]:
+def _value(family: Family, designs: Array, one: Quantity, found: Extrema, windowed: bool) -> tuple[Array, Array]:
     """Compute a design output and its error from its extrema."""
     first, *others = (found[r] for r in requests(family, one, windowed))
     match one:

@@ -10,8 +10,9 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
 from sweep.numerics.events import zeros
+from sweep.numerics.records import Index, Mask
 from sweep.reductions.resolution import denser
-from sweep.reductions.sampling import Index, Mask, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import blocks, pose_columns, sample_turn
 
 BESIDE = 1e-5  # [rad] step of the difference quotient of a value over the position
 

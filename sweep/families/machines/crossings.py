@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
@@ -20,6 +20,7 @@ from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 from sweep.families.machines.relations import Relation
 from sweep.numerics.events import bottoms, zeros
+from sweep.numerics.records import Index, Mask, only
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -33,16 +34,11 @@ Places: TypeAlias = dict[str, Any]
 """Crank angles (n,) of the designs by name, "count" and "status"."""
 
 
-@dataclass
-class CrankAngles:
+class CrankAngles(NamedTuple):
     """Crank angles of several designs, with the row of the design of each."""
 
-    row: NDArray[np.intp]
+    row: Index
     phi: Array
-
-    def take(self, which: NDArray[Any]) -> CrankAngles:
-        """Select crank angles by index or mask."""
-        return CrankAngles(self.row[which], self.phi[which])
 
 
 @dataclass(frozen=True)
@@ -193,7 +189,7 @@ class Poses:
         phi = np.concatenate([np.tile(grid, n), extremes.phi])
         height = np.concatenate([values.ravel(), at_extremes])
         order = np.lexsort((phi, row))
-        nodes, height = CrankAngles(row, phi).take(order), height[order]
+        nodes, height = only(CrankAngles(row, phi), order), height[order]
         left, right, after = _neighbours(nodes)
         k = np.flatnonzero((height < 0.0) & (height[after] >= 0.0) | (height > 0.0) & (height[after] <= 0.0))
         row = nodes.row[k]
@@ -202,7 +198,7 @@ class Poses:
         with np.errstate(divide="ignore", invalid="ignore"):
             polished = found - x / slope
         found = np.mod(np.where((polished > left[k]) & (polished < right[k]), polished, found), TWO_PI)
-        return CrankAngles(row, found).take(np.lexsort((found, row)))
+        return only(CrankAngles(row, found), np.lexsort((found, row)))
 
     def first(self, name: str, level: float, sense: float, count: int = SAMPLES) -> tuple[NDArray[np.uint8], Array]:
         """Find status and first passage of an output through a level in a sense, each (n,); nan without one.
@@ -226,9 +222,7 @@ class Poses:
             status[row] = st.NOT_CONVERGED
         return status, found
 
-    def _root(
-        self, row: NDArray[np.intp], left: Array, right: Array, name: str, values: Array, level: float = 0.0
-    ) -> Array:
+    def _root(self, row: Index, left: Array, right: Array, name: str, values: Array, level: float = 0.0) -> Array:
         """Find a root in each bracket where an output passes a level.
 
         It is computed on polynomials through samples (n, m), then corrected by one step on poses; where that step is
@@ -253,7 +247,7 @@ class Poses:
             better[rest] = zeros(lambda k, phi: self.near(some[k], phi, name) - level, left[rest], right[rest])
         return np.asarray(better, np.float64)
 
-    def least(self, row: NDArray[np.intp], start: Array, end: Array, name: str, samples: int = 64) -> Array:
+    def least(self, row: Index, start: Array, end: Array, name: str, samples: int = 64) -> Array:
         """Find where an output is smallest between two angles of each design, (k,)."""
         if not row.size:
             return np.zeros(0)
@@ -276,7 +270,7 @@ class Poses:
         return place
 
 
-def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, NDArray[np.intp]]:
+def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, Index]:
     """Return each angle, sorted by design, the next angle of its design around the turn, and the index of that."""
     row, phi = ordered.row, ordered.phi
     first = np.searchsorted(row, row)
@@ -285,7 +279,7 @@ def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, NDArray[np.intp]]:
     return phi, phi[after] + np.where(last, TWO_PI, 0.0), after
 
 
-def largest(row: NDArray[np.intp], values: Array, n: int) -> Array:
+def largest(row: Index, values: Array, n: int) -> Array:
     """Largest value of each design; nan for designs without one."""
     most = np.full(n, -np.inf)
     np.maximum.at(most, row, values)
@@ -298,16 +292,14 @@ def where_largest(found: CrankAngles, values: Array, n: int) -> Array:
     return scattered(n, found.row[order], found.phi[order])
 
 
-def scattered(n: int, row: NDArray[np.intp], values: Array) -> Array:
+def scattered(n: int, row: Index, values: Array) -> Array:
     """Expand values of some designs to all; nan for the others."""
     column = np.full(n, np.nan)
     column[row] = values
     return column
 
 
-def verdict(
-    status: NDArray[np.uint8], touching: NDArray[np.bool_], right: NDArray[Any], wrong: NDArray[Any]
-) -> NDArray[np.uint8]:
+def verdict(status: NDArray[np.uint8], touching: Mask, right: NDArray[Any], wrong: NDArray[Any]) -> NDArray[np.uint8]:
     """Status of designs from the numbers of passages in the stated sense and against it."""
     return np.select(
         [status != st.OK, touching, right > 1, (right == 0) & (wrong > 0), right == 0],

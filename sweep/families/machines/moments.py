@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import TWO_PI, Array
@@ -22,6 +21,7 @@ from sweep.families.machines.segments import Gap, cross, dot, minus
 from sweep.families.machines.thread_way import turned as turned_back
 from sweep.families.machines.tools import Blade, Needle, rate_of
 from sweep.families.sites import AXES
+from sweep.numerics.records import Index, only
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -238,7 +238,7 @@ class Taking(crossings.Moment):
         places["far"] = crossings.where_largest(extremes, -sense * across, n)
         lag = np.mod(extremes.phi - passage[extremes.row], TWO_PI)
         between = (lag <= np.mod(after - passage, TWO_PI)[extremes.row]) & (sense * across > 0.0)
-        places["beyond"] = crossings.where_largest(extremes.take(between), sense * across[between], n)
+        places["beyond"] = crossings.where_largest(only(extremes, between), sense * across[between], n)
         if f"{name}_free" in wanted:
             rows = np.flatnonzero(status == st.OK)
             places["near"] = crossings.scattered(
@@ -311,7 +311,7 @@ def _last(stops: crossings.CrankAngles, depth: Array, size: Array, phi: Array) -
     return found
 
 
-def _following(roots: crossings.CrankAngles, taken: NDArray[np.intp]) -> NDArray[np.intp]:
+def _following(roots: crossings.CrankAngles, taken: Index) -> Index:
     """Index of the next passage of the same design, around the turn."""
     after = taken + 1
     same = np.append(roots.row, -1)[after] == roots.row[taken]

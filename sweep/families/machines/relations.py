@@ -119,7 +119,7 @@ class Distance(Relation):
 
 
 @dataclass(frozen=True)
-class Speed(Relation):
+class PointSpeed(Relation):
     """Speed of a point in the machine's frame, or of a second point relative to the first.
 
     ``points`` are one or two dotted names such as "looper.tip".

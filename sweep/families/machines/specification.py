@@ -21,8 +21,8 @@ from sweep.families.machines.pressing import read_pressing
 from sweep.families.machines.relations import (
     Distance,
     EventValue,
+    PointSpeed,
     Relation,
-    Speed,
     Timing,
     check_unique,
     known_names,
@@ -294,8 +294,8 @@ def _relation(
     if kind == "speed":
         moving = [f"{m.name}.{point}" for m in members.values() for point in m.moving]
         if len(given) == 1:
-            return Speed(name, known_names(given, moving, "points whose velocity is known", where))
-        return Speed(name, two_names(given, moving, "points whose velocity is known", where))
+            return PointSpeed(name, known_names(given, moving, "points whose velocity is known", where))
+        return PointSpeed(name, two_names(given, moving, "points whose velocity is known", where))
     if kind == "timing":
         return Timing(name, two_names(given, None, "crank angles", where))
     known = {f"{m.name}{number}": (m.name, number) for m in members.values() for number in _stages(m.family)}

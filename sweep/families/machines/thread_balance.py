@@ -167,7 +167,7 @@ class ThreadBalance(Relation):
         """Return the outputs, (n, m); ``found`` holds "phi" of the main shaft, events as "phi_...", parameters."""
         phi, (moving, bent) = found[thread_way.PHI], self._asked(wanted)
         needed, rate, taken = 0.0 * phi, 0.0 * phi, 0.0 * phi
-        wraps: list[tuple[thread_way.Waypoint, Any, thread_way.Piece]] = []
+        wraps: list[tuple[thread_way.Waypoint, Any, thread_way.PlacedPoint]] = []
         for up, places in groupby(self.path, _is_take_up):
             run = list(places)
             if not up:
@@ -179,7 +179,7 @@ class ThreadBalance(Relation):
             for place in run:
                 assert isinstance(place.on, thread_way.TakeUp)
                 taken = taken + found[place.on.taken]
-                wraps += [(place, found[place.on.wrap], thread_way.Piece((), (), None))] if bent else []
+                wraps += [(place, found[place.on.wrap], thread_way.PlacedPoint((), (), None))] if bent else []
         sewn, sewing = self._passed("feeding", found)
         drawn, drawing = self._passed("drawing", found)
         given, demand = found[f"{self.name}_stock"] - taken, needed + sewn - drawn

@@ -53,7 +53,7 @@ class Waypoint:
     fixed: tuple[str, ...] = ()
 
 
-class Piece(NamedTuple):
+class PlacedPoint(NamedTuple):
     """A place at every pose: coordinates, velocity, and the mask of the poses at which thread lies on it, or None."""
 
     at: Point
@@ -94,14 +94,14 @@ def _chosen(where: Any, a: Point, b: Point) -> Point:
     return [np.where(where, x, y) for x, y in zip(a, b, strict=True)]
 
 
-def placed_points(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[Piece]:
+def placed_points(run: Sequence[Waypoint], found: Mapping[str, Any], moving: bool) -> list[PlacedPoint]:
     """Place the points of a run; first those not on blades, which lie between points that do not depend on them."""
-    pieces: list[Piece] = []
+    pieces: list[PlacedPoint] = []
     for place in run:
         spot = place.on.tip if isinstance(place.on, Edge) else place.on
         assert isinstance(spot, Spot)
         rate = spot.velocity(found) if moving else ()
-        pieces.append(Piece(spot.position(found), rate, outside(place.held, found, inside=True)))
+        pieces.append(PlacedPoint(spot.position(found), rate, outside(place.held, found, inside=True)))
     for k, place in enumerate(run):
         if isinstance(place.on, Edge):
             tip, back = pieces[k], place.on.back.position(found)
@@ -115,16 +115,16 @@ def placed_points(run: Sequence[Waypoint], found: Mapping[str, Any], moving: boo
     return pieces
 
 
-def beside(pieces: Sequence[Piece], k: int, step: int) -> Piece:
+def beside(pieces: Sequence[PlacedPoint], k: int, step: int) -> PlacedPoint:
     """Return the next place before or after a place over which the thread runs; at the ends it always runs."""
     piece = pieces[k + step]
     if piece.on is None:
         return piece
     other = beside(pieces, k + step, step)
-    return Piece(_chosen(piece.on, piece.at, other.at), _chosen(piece.on, piece.rate, other.rate), None)
+    return PlacedPoint(_chosen(piece.on, piece.at, other.at), _chosen(piece.on, piece.rate, other.rate), None)
 
 
-def length_and_bends(pieces: Sequence[Piece], moving: bool, bent: bool) -> tuple[Any, Any, list[Any]]:
+def length_and_bends(pieces: Sequence[PlacedPoint], moving: bool, bent: bool) -> tuple[Any, Any, list[Any]]:
     """Return the length of a run, its derivative, and the bends at all places but its ends."""
     length: Any = 0.0
     change: Any = 0.0
