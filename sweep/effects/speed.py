@@ -104,8 +104,7 @@ def samples(grid: Scene) -> tuple[Array, Array]:
 
 def _late(scene: Scene) -> NDArray[np.bool_]:
     """Whether designs need finer grids than usual, because a tool pierces or a planet turns fast, (n,)."""
-    late: NDArray[np.bool_] = scene.least_samples > GRIDS[-1]
-    return late
+    return scene.least_samples > GRIDS[-1]
 
 
 def _bent(scene: Scene) -> NDArray[np.bool_]:

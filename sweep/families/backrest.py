@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from kernels.families import backrest
-from kernels.types import Array
+from kernels.types import Array, Status
 from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter, floats
 from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton
-from sweep.families.poses import chosen, guarded
+from sweep.families.poses import following, guarded, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 FRAME = (
@@ -123,23 +124,12 @@ def kernel_matrix(designs: Array, names: tuple[str, ...]) -> Array:
     return matrix
 
 
-def solved(matrix: Array, modes: np.ndarray, angles: Angles, wanted: frozenset[str], position: str) -> Columns:
-    """Compute the wanted outputs and status by the kernel; ``position`` is the entry's name of the bracket angle."""
-    shape, dtype = (len(matrix), angles.phi.shape[1]), np.result_type(matrix, angles.phi)
-    # the complex step covers the radius too, so that extrema over the beam can be followed
-    matrix, radius = matrix.astype(dtype, copy=False), np.ascontiguousarray(angles.phi, dtype)
-    status = np.empty(shape, np.uint8)
-    needed = wanted | ({"K_couple"} if DRIFT.name in wanted else set())
-    names = [[position, *(o.name for o in GEOMETRY[1:])], [o.name for o in LOADS], [o.name for o in BAND]]
-    blocks = [None if needed.isdisjoint(group) else np.empty((len(group), *shape), dtype) for group in names]
-    backrest.poses(matrix, radius, modes, status, *blocks)
-    found: dict[str, Array] = {}
-    for group, block in zip(names, blocks, strict=True):
-        if block is not None:
-            found |= dict(zip(group, block, strict=True))
-    if DRIFT.name in wanted:
-        found[DRIFT.name] = found["K_couple"] - matrix[:, _COLUMNS.index("K0"), None]
-    return chosen(found, wanted, status)
+class _Blocks(NamedTuple):
+    """Groups of outputs that the kernel computes together, (k, n, m) each."""
+
+    geometry: Array | None
+    loads: Array | None
+    band: Array | None
 
 
 def mode_of(mode: backrest.Mode, designs: Array) -> np.ndarray:
@@ -250,22 +240,30 @@ def _entry(
     outputs: tuple[Output, ...], position: str, example: dict[str, float],
 ) -> Family:  # fmt: skip
     """Make an entry of the back-rest; its first output is the bracket angle, ``modes`` selects the equation."""
-    names, angle = tuple(p.name for p in parameters), outputs[0].name
+    names = tuple(p.name for p in parameters)
 
-    def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        return solved(kernel_matrix(designs, names), modes(designs), angles, wanted, angle)
+    def kernel(designs: Array, radius: Array, status: Status, blocks: _Blocks) -> None:
+        # the complex step covers the radius too, so that extrema over the beam can be followed
+        dtype, matrix = np.result_type(designs, radius), kernel_matrix(designs, names)
+        radius = np.ascontiguousarray(radius, dtype)
+        backrest.poses(matrix.astype(dtype, copy=False), radius, modes(designs), status, *blocks)
 
+    def drift(designs: Array, tension: Array) -> Array:
+        return tension - designs[:, [names.index(K0.name)]]
+
+    groups = {"geometry": (outputs[0], *GEOMETRY[1:]), "loads": LOADS, "band": BAND}
+    solved = poses_of(kernel, _Blocks, groups, angles="phi")
     return Family(
         name=name,
         title=title,
         parameters=parameters,
         position=position,
         pose_outputs=outputs,
-        poses=guarded(poses),
+        poses=guarded(following(solved, {DRIFT.name: (("K_couple",), drift)})),
         example=EXAMPLE | example,
         domain=beam_of(names),
         points={"axis": ("x_axis", "y_axis", None)},
-        capabilities=(skeleton(parameters, angle),),
+        capabilities=(skeleton(parameters, outputs[0].name),),
     )
 
 

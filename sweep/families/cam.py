@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from sweep.families.capabilities import Dimensions, Link, MovingPoint, OutputLin
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
-from sweep.families.poses import poses_of
+from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import ORIGIN, X, dimensions, line, links, parameter, standing
 
 PHASES = (
@@ -68,20 +67,21 @@ def phase_ends(designs: Array) -> Array:
     return np.where(kind == cam.FOURIER, 0.0, ends)
 
 
-_profile = poses_of(cam.poses, cam.Outputs, angles="phi")
+def _height(designs: Array, s: Array) -> Array:
+    """Roller's centre along the direction of lift, (6)."""
+    r0, e = dimensions(PARAMETERS, designs, "r0", "e")
+    with np.errstate(invalid="ignore"):  # an offset beyond the prime circle is reported by the status
+        return np.sqrt((r0 - e) * (r0 + e)) + s
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    of_roller = wanted & {o.name for o in ROLLER_OUTPUTS}
-    found = _profile(designs, angles, wanted | ({"s"} if of_roller else set()))
-    if of_roller:
-        s: Any = found["s"] if "s" in wanted else found.pop("s")
-        r0, e = dimensions(PARAMETERS, designs, "r0", "e")
-        with np.errstate(invalid="ignore"):  # an offset beyond the prime circle is reported by the status
-            places = {"x_r": np.sqrt((r0 - e) * (r0 + e)) + s, "y_r": -e + 0.0 * s}
-        found |= {name: places[name] for name in of_roller}
-    return found
+def _aside(designs: Array, s: Array) -> Array:
+    """Roller's centre to the left of the direction of lift, (6)."""
+    (e,) = dimensions(PARAMETERS, designs, "e")
+    return -e + 0.0 * s
+
+
+# Wanted pose outputs and status of every design at its cam angles, each (n, m).
+poses = following(poses_of(cam.poses, cam.Outputs, angles="phi"), {"x_r": (("s",), _height), "y_r": (("s",), _aside)})
 
 
 def follower_line(designs: Array) -> tuple[Array, Array]:

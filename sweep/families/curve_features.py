@@ -280,8 +280,7 @@ def _named(member: Member, names: frozenset[str] | None, sums: frozenset[str]) -
 
 
 def _geared(member: Member, count: DesignMap, designs: Array) -> Array:
-    found: Array = abs(member.ratio) * count(member.designs(designs))
-    return found
+    return abs(member.ratio) * count(member.designs(designs))
 
 
 def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles: Angles, *found: Columns) -> Array:

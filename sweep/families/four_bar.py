@@ -18,7 +18,7 @@ from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Columns, Family, Output, PoseFunction
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import step_of
+from sweep.families.poses import following, on_matrix, step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
 # a b c e; the coupler point, which is optional; branch
@@ -66,18 +66,20 @@ def as_guide(designs: Array) -> Array:
 def _poses(
     rocker: PoseFunction, point: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]
 ) -> Columns:
-    asked = frozenset(_POINT[name] for name in wanted if name in _POINT)
-    rest = frozenset(name for name in wanted if name not in _POINT)
-    columns: Columns = {}
-    if asked:
-        found = point(as_guide(designs), angles, asked)
-        columns = {name: found[_POINT[name]] for name in wanted if name in _POINT} | {"status": found["status"]}
-    if rest or not asked:
-        turned = rocker(as_crank_rocker(designs), angles, rest)
-        if asked:  # the status of the rocker has precedence over that of the point
+    of_point = wanted & _POINT.keys()
+    columns = point(designs, angles, of_point) if of_point else {}
+    if wanted - of_point or not of_point:
+        turned = rocker(designs, angles, wanted - of_point)
+        if of_point:  # the status of the rocker has precedence over that of the point
             turned["status"] = np.where(turned["status"] == st.OK, columns["status"], turned["status"])
         columns |= turned
     return columns
+
+
+def _both(rocker: PoseFunction, point: PoseFunction) -> PoseFunction:
+    """Make poses from those of the crank-rocker and of the guide."""
+    of_point = following(on_matrix(point, as_guide), {}, _POINT.__getitem__)
+    return partial(_poses, on_matrix(rocker, as_crank_rocker), of_point)
 
 
 FAMILY = Family(
@@ -86,7 +88,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=ROCKER_OUTPUTS + POINT_OUTPUTS,
-    poses=partial(_poses, crank_rocker.poses, guide.poses),
+    poses=_both(crank_rocker.poses, guide.poses),
     example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "branch": 1.0},
     steps=tuple(step_of(step, as_crank_rocker) for step in crank_rocker.FAMILY.steps),
     derivative_of=ladders("psi") | ladders("x_m", "y_m", orders=2),
@@ -104,5 +106,5 @@ FAMILY = Family(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e")}, (CRANK, can.Link("coupler", ("b", "c", "m")), ROCKER)
         ),
     ),
-    precise_poses=partial(_poses, crank_rocker.precise_poses, guide.precise_poses),
+    precise_poses=_both(crank_rocker.precise_poses, guide.precise_poses),
 )  # fmt: skip

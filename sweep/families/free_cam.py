@@ -14,7 +14,7 @@ from sweep.families.capabilities import Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Bends
 from sweep.families.outputs import ladders
 from sweep.families.planar_trees import turning_cam
-from sweep.families.poses import poses_of
+from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
 PARAMETERS = (
@@ -72,8 +72,7 @@ def straight(designs: Array) -> Array:
     """Intersect the straight line between the guides with the plane of the cam, (n, 3)."""
     guides = (np.stack([parameter(PARAMETERS, f"{axis}{k}", designs) for axis in "XYZ"], axis=1) for k in (1, 2))
     first, second = guides
-    point: Array = first + (second - first) * (first[:, 2:] / (first[:, 2:] - second[:, 2:]))
-    return point
+    return first + (second - first) * (first[:, 2:] / (first[:, 2:] - second[:, 2:]))
 
 
 def depth(designs: Array, angles: Angles) -> Array:
@@ -135,16 +134,20 @@ _FRICTIONLESS = len(PARAMETERS)
 DOMAIN = March(text="cam angle")
 
 
-def sliding_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status, each (n, m), of the last turn of the march."""
-    needed = wanted | {"L"} if "P" in wanted else wanted
+def _last_turn(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    """Compute the outputs of the kernel and status, each (n, m), of the last turn of the march."""
     own = np.ascontiguousarray(designs[:, :_FRICTIONLESS])
     friction = np.ascontiguousarray(designs[:, [_FRICTIONLESS + 1, _FRICTIONLESS + 2, _FRICTIONLESS]])
     kernel = partial(free_cam.march, friction, DOMAIN.turns)
-    found = poses_of(kernel, free_cam.MarchOutputs)(own, angles, needed)
-    if "P" in wanted:
-        found["P"] = np.asarray(found["L"], np.float64) - designs[:, _FRICTIONLESS - 1 : _FRICTIONLESS]
-    return {name: found[name] for name in (*wanted, "status")}
+    return poses_of(kernel, free_cam.MarchOutputs)(own, angles, wanted)
+
+
+def _taken(designs: Array, length: Array) -> Array:
+    """Thread taken up, (6)."""
+    return length - designs[:, _FRICTIONLESS - 1 : _FRICTIONLESS]
+
+
+sliding_poses = following(_last_turn, {"P": (("L",), _taken)})
 
 
 def contact_place(designs: Array, angles: Angles, found: Columns) -> Array:

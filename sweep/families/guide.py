@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,10 @@ from kernels.families import rssr as rssr_kernels
 from kernels.types import Array
 from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, PoseFunction
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import poses_of, together
+from sweep.families.poses import following, poses_of, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
 PARAMETERS = (
@@ -49,7 +48,6 @@ POINT_OUTPUTS = tuple(
     for axis, way in zip("xy", ALONG_FRAME, strict=True)
 )
 
-_POINT = {"dx_m": ("ds", "ddev"), "dy_m": ("ds", "ddev"), "d2x_m": ("d2s", "d2dev"), "d2y_m": ("d2s", "d2dev")}
 _LAM = [p.name for p in PARAMETERS].index("lam")
 
 
@@ -67,22 +65,16 @@ def _precise_motion(designs: Array, angles: Angles, wanted: frozenset[str]) -> C
     return _kernel_precise_poses(designs, angles, wanted)
 
 
-def _with_point(motion: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the outputs of a motion, with the coupler point's rates transformed from the line to the frame."""
-    own = [name for name in _POINT if name in wanted]
-    if not own:
-        return motion(designs, angles, wanted)
-    needed = (wanted - set(own)).union(*(_POINT[name] for name in own))
-    found: dict[str, Any] = dict(motion(designs, angles, frozenset(needed)))
+def _rotated(axis: str, designs: Array, along: Array, across: Array) -> Array:
+    """Transform a rate of the coupler point from the line to the frame."""
     cos, sin = np.cos(designs[:, [_LAM]]), np.sin(designs[:, [_LAM]])
-    for name in own:
-        along, across = (found[part] for part in _POINT[name])
-        found[name] = along * cos - across * sin if "x" in name else along * sin + across * cos
-    return {name: found[name] for name in (*wanted, "status")}
+    return along * cos - across * sin if axis == "x" else along * sin + across * cos
 
 
+_RATES = {f"{order}{axis}_m": ((f"{order}s", f"{order}dev"), partial(_rotated, axis))
+          for order in ("d", "d2") for axis in "xy"}  # fmt: skip
 # Wanted pose outputs and status of every design at its crank angles, each (n, m); plain and in doubled precision.
-poses, precise_poses = partial(_with_point, _motion), partial(_with_point, _precise_motion)
+poses, precise_poses = following(_motion, _RATES), following(_precise_motion, _RATES)
 
 
 def as_crank_rocker(designs: Array) -> Array:

@@ -10,7 +10,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Param
 from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
-from sweep.families.poses import poses_of
+from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import Y, line, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
@@ -50,18 +50,18 @@ DESIGN_OUTPUTS = (
     Output("jam_angle", "rad", "pressure angle at which the follower jams", "(13)"),
     Output("least_displacement", "length", "least displacement of the follower over the turn", "(10)"),
 )
-_poses = poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS})
 
 
-def poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted pose outputs and status of every design at its cam angles, each (n, m)."""
-    asked = wanted | {"S"} if WRAP.name in wanted else wanted
-    columns = _poses(designs, angles, asked)
-    if WRAP.name in wanted:
-        x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
-        # The guides are symmetric, so the thread makes the same angle with their line on both sides.
-        columns[WRAP.name] = 2.0 * np.arctan(np.asarray(columns["S"]) / np.sqrt(z1 * z1 + (e - x1) ** 2))
-    return {name: columns[name] for name in (*wanted, "status")}
+def _wrap(designs: Array, s: Array) -> Array:
+    """Angle of wrap: the guides are symmetric, so the thread makes the same angle with their line on both sides."""
+    x1, z1, e = (designs[:, [k]] for k in (1, 2, 3))
+    return 2.0 * np.arctan(s / np.sqrt(z1 * z1 + (e - x1) ** 2))
+
+
+# Wanted pose outputs and status of every design at its cam angles, each (n, m).
+poses = following(
+    poses_of(guided_cam.poses, guided_cam.Outputs, {"profile": PROFILE_OUTPUTS}), {WRAP.name: (("S",), _wrap)}
+)
 
 
 def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:

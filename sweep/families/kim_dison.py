@@ -7,18 +7,17 @@ alpha = 90 deg, branch = -branch; psi is its alpha.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from kernels import status as st
 from kernels.families import rssr
-from kernels.types import Array
+from kernels.types import Array, Status
 from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
+from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import chosen, step_of
+from sweep.families.poses import Made, chosen, following, on_matrix, step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
 PARAMETERS = (
@@ -59,14 +58,6 @@ SWING_OUTPUTS = (
     Output("swing", "rad", "angle between the two limit positions, not negative", "(8)"),
 )
 
-# Pose outputs of the crank-rocker needed for the outputs here.
-_NEEDS = {
-    "omega3": ("dpsi",),
-    "epsilon3": ("dpsi", "d2psi"),
-    "sin_transmission": ("discriminant",),
-    "x_b": ("z_b",), "y_b": ("x_b",), "z_b": ("y_b",), "x_c": ("z_c",), "y_c": ("x_c",), "z_c": ("y_c",),
-}  # fmt: skip
-
 
 def _theirs(name: str) -> str:
     """Return the crank-rocker's name of a quantity."""
@@ -88,31 +79,27 @@ def as_crank_rocker(designs: Array) -> Array:
     return matrix
 
 
-def _poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    matrix = as_crank_rocker(designs)
-    asked = frozenset(part for name in wanted for part in _NEEDS.get(name, (_theirs(name),)))
-    found = run(matrix, angles, asked)
-    columns: Columns = {"status": found["status"]}
-    omega, epsilon, offset = (designs[:, k, None] for k in (5, 6, 4))
-    for name in wanted - {"status"}:
-        parts: list[Array] = [np.asarray(found[part]) for part in _NEEDS.get(name, (_theirs(name),))]
-        columns[name] = parts[0]
-        if name == "omega3":
-            columns[name] = parts[0] * omega
-        elif name == "epsilon3":
-            columns[name] = parts[1] * omega**2 + parts[0] * epsilon
-        elif name == "sin_transmission":
-            # T/b of the crank-rocker; nan where the links do not reach
-            reached = np.isin(found["status"], (st.OK, st.DEAD_POINT))
-            square = np.where(reached, parts[0], np.nan)
-            columns[name] = matrix[:, 7, None] * np.sqrt(square) / (2.0 * matrix[:, 1, None] * matrix[:, 2, None])
-        elif name in ("x_b", "x_c"):
-            columns[name] = -parts[0]
-        elif name == "z_b":
-            columns[name] = parts[0] - parts[0]  # the pin stays in the crank plane; a difference to b leaves rounding
-        elif name == "z_c":
-            columns[name] = offset - parts[0]
-    return columns
+def _sine(designs: Array, discriminant: Array, status: Status) -> Array:
+    """T/b of the crank-rocker; nan where the links do not reach."""
+    square = np.where(np.isin(status, (st.OK, st.DEAD_POINT)), discriminant, np.nan)
+    return -designs[:, [7]] * np.sqrt(square) / (2.0 * designs[:, [1]] * designs[:, [2]])
+
+
+_MADE: Made = {
+    "omega3": (("dpsi",), lambda designs, rate: rate * designs[:, [5]]),
+    "epsilon3": (("dpsi", "d2psi"), lambda designs, rate, bend: bend * designs[:, [5]] ** 2 + rate * designs[:, [6]]),
+    "sin_transmission": (("discriminant", "status"), _sine),
+    "x_b": (("z_b",), lambda designs, z: -z),
+    "y_b": (("x_b",), lambda designs, x: x),
+    "z_b": (("y_b",), lambda designs, y: y - y),  # the pin stays in the crank plane; a difference to b leaves rounding
+    "x_c": (("z_c",), lambda designs, z: -z),
+    "y_c": (("x_c",), lambda designs, x: x),
+    "z_c": (("y_c",), lambda designs, y: designs[:, [4]] - y),
+}
+poses, precise_poses = (
+    following(on_matrix(run, as_crank_rocker), _MADE, _theirs)
+    for run in (crank_rocker.poses, crank_rocker.precise_poses)
+)
 
 
 def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -134,7 +121,7 @@ FAMILY = Family(
     parameters=PARAMETERS,
     position="alpha",
     pose_outputs=MOTION_OUTPUTS + OWN_OUTPUTS,
-    poses=partial(_poses, crank_rocker.poses),
+    poses=poses,
     example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
         Step("swing", SWING_OUTPUTS, swing),
@@ -163,5 +150,5 @@ FAMILY = Family(
             CRANK_ROCKER,
         ),
     ),
-    precise_poses=partial(_poses, crank_rocker.precise_poses),
+    precise_poses=precise_poses,
 )

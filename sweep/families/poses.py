@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial, update_wrapper
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -114,6 +114,30 @@ def poses_of(
         return columns | {"status": status}
 
     return poses
+
+
+Made: TypeAlias = Mapping[str, tuple[tuple[str, ...], Callable[..., Array]]]
+"""For an output the names that it needs, of other outputs or "status", and a function of the designs and of these."""
+
+
+def following(poses: PoseFunction, made: Made, theirs: Callable[[str], str] = str) -> PoseFunction:
+    """Make poses some of whose outputs follow from those of other poses; ``theirs`` names the rest there."""
+
+    def found(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+        needs = {name: made[name][0] if name in made else (theirs(name),) for name in wanted}
+        given = poses(designs, angles, frozenset[str]().union(*needs.values()) - {"status"})
+        columns: Columns = {"status": given["status"]}
+        for name, names in needs.items():
+            parts = [given[one] for one in names]
+            columns[name] = made[name][1](designs, *parts) if name in made else parts[0]
+        return columns
+
+    return found
+
+
+def on_matrix(poses: PoseFunction, matrix: DesignMap) -> PoseFunction:
+    """Make poses of designs that ``matrix`` maps to those of other poses."""
+    return lambda designs, angles, wanted: poses(matrix(designs), angles, wanted)
 
 
 def optional_outputs(

@@ -18,7 +18,7 @@ from sweep.families import capabilities as can
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, floats
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import chosen, move_records, poses_of, step_of
+from sweep.families.poses import Made, chosen, following, move_records, poses_of, step_of
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, squared, standing
 
 PARAMETERS = (
@@ -191,7 +191,10 @@ PLANAR_OUTPUTS = (
 )
 
 # The spatial linkage has its slide line along y: its x is minus this y, and its crank angle a quarter turn more.
-_THEIRS = {"x_b": "y_b", "y_b": "x_b", "x_c": "y_c", "y_c": "x_c"}
+_MADE: Made = {
+    "x_b": (("y_b",), lambda designs, y: y), "y_b": (("x_b",), lambda designs, x: 0.0 - x),
+    "x_c": (("y_c",), lambda designs, y: y), "y_c": (("x_c",), lambda designs, x: 0.0 - x),
+}  # fmt: skip
 _ANGLES = ("phi_ext", "phi_fold")
 _FROM_SPATIAL = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
@@ -208,13 +211,8 @@ def turned(angles: Angles) -> Angles:
     return Angles(angles.phi + 0.5 * np.pi, np.ascontiguousarray(-angles.sin), angles.cos)
 
 
-def _turned_poses(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-    found = run(as_spatial(designs), turned(angles), frozenset(_THEIRS.get(name, name) for name in wanted))
-    columns: Columns = {"status": found["status"]}
-    for name in wanted - {"status"}:
-        values: Array = np.asarray(found[_THEIRS.get(name, name)])
-        columns[name] = 0.0 - values if name in ("y_b", "y_c") else values
-    return columns
+def _on_spatial(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
+    return run(as_spatial(designs), turned(angles), wanted)
 
 
 def _planar_step(step: Step) -> Step:
@@ -248,7 +246,7 @@ PLANAR = Family(
     parameters=PLANAR_PARAMETERS,
     position="s",
     pose_outputs=PLANAR_OUTPUTS,
-    poses=partial(_turned_poses, poses),
+    poses=following(partial(_on_spatial, poses), _MADE),
     example={"a": 1.0, "b": 3.0, "e": 0.4, "branch": -1.0},
     steps=tuple(_planar_step(step) for step in FAMILY.steps),
     derivative_of=ladders("s"),
@@ -262,5 +260,5 @@ PLANAR = Family(
         PLANAR_SLIDER_POINTS,
         can.Skeleton({"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, None, "e", axis=X, kind="slide")}, SLIDER_CRANK),
     ),
-    precise_poses=partial(_turned_poses, precise_poses),
+    precise_poses=following(partial(_on_spatial, precise_poses), _MADE),
 )

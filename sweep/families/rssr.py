@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,10 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.types import TWO_PI, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, Work, floats
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import chosen, move_records, optional_outputs, poses_of, together
+from sweep.families.poses import chosen, move_records, on_matrix, optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
@@ -128,10 +128,7 @@ def moving_alike(
         if place is not None:
             move_records(place[0], place[1](designs), per_pose, per_design)
 
-    def turned(run: PoseFunction, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
-        return run(matrix(designs), angles, wanted)
-
-    moved = None if itself else (partial(turned, poses), partial(turned, precise_poses))
+    moved = None if itself else (on_matrix(poses, matrix), on_matrix(precise_poses, matrix))
     records = can.JointRecords(fill, JOINT_NEEDS, "rocker", moved)
     return records, can.PressureEllipse(lambda designs: ellipse(matrix(designs))), can.CrankRockerLoop(matrix)
 

@@ -84,8 +84,7 @@ def axis_squared(parameters: tuple[Parameter, ...], designs: Array, angles: Angl
     """
     a, e = dimensions(parameters, designs, "a", "e")
     x, y = floats(found, "x_b", "y_b")
-    squared: Array = np.square((x - e) / a) + np.square(y / a)
-    return squared
+    return np.square((x - e) / a) + np.square(y / a)
 
 
 _RATES = ("cos_psi", "sin_psi", "dpsi", "d2psi", "rho", "drho", "d2rho")

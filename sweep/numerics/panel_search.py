@@ -199,8 +199,7 @@ def _upper(panels: Panels, mode: int) -> Array:
 
 def measured(values: Array, mode: int) -> Array:
     """Heights of values in the sense of ``mode``."""
-    heights: Array = np.abs(values) if mode == 0 else mode * values
-    return heights
+    return np.abs(values) if mode == 0 else mode * values
 
 
 def places(low: Array, high: Array) -> Array:
@@ -238,8 +237,7 @@ def first_of_equals(row: Index, phi: Array, err_phi: Array, height: Array, err: 
     late = np.where(height >= height[best] - known, -place, -np.inf)
     first = np.full(row.max(initial=0) + 1, -1)
     scan.best_candidate(row, late, np.full(first.size, -np.inf), first)
-    found: Index = first[row[chosen]]
-    return found
+    return first[row[chosen]]
 
 
 def _of_row(row: Index, chosen: Index) -> Index:

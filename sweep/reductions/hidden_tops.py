@@ -59,8 +59,7 @@ def doubtful(candidates: PeakCandidates, peaks: Peaks, around: Array, tolerance:
     curve = _curve(candidates, 1 + candidates.request.max(initial=0))
     best = np.full(curve.max(initial=0) + 1, -np.inf)
     np.maximum.at(best, curve, peaks.height)
-    found: Index = np.flatnonzero((off > np.maximum(tolerance, NARROW * fall)) & (peaks.height + off >= best[curve]))
-    return found
+    return np.flatnonzero((off > np.maximum(tolerance, NARROW * fall)) & (peaks.height + off >= best[curve]))
 
 
 def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Mask) -> PeakCandidates:
@@ -121,17 +120,14 @@ def apart(known: tuple[PeakCandidates, Peaks], found: tuple[PeakCandidates, Peak
     low, high = (2.0 * TWO_PI * _curve(which, requests) + np.mod(peaks.phi, TWO_PI) for which, peaks in (known, found))
     low = np.concatenate([[-np.inf], np.sort(low), [np.inf]])
     above = np.searchsorted(low, high)
-    new: Index = np.flatnonzero(np.minimum(high - low[above - 1], low[above] - high) > found[1].spacing)
-    return new
+    return np.flatnonzero(np.minimum(high - low[above - 1], low[above] - high) > found[1].spacing)
 
 
 def _curve(candidates: PeakCandidates, requests: int) -> Index:
     """Index of each candidate's curve."""
-    numbers: Index = candidates.row * requests + candidates.request
-    return numbers
+    return candidates.row * requests + candidates.request
 
 
 def _column(phi: Array, samples: int) -> Index:
     """Index of the nearest sample."""
-    nearest: Index = np.rint(phi * (samples / TWO_PI)).astype(np.int64) % samples
-    return nearest
+    return np.rint(phi * (samples / TWO_PI)).astype(np.int64) % samples

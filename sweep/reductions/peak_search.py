@@ -89,13 +89,11 @@ class PeakSearch:
     def needed(self, rows: Index) -> Index:
         """Smallest number of samples that a request of these designs still needs, 0 where all are found."""
         left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
-        fewest: Index = np.where(left < NEVER, left, 0)
-        return fewest
+        return np.where(left < NEVER, left, 0)
 
     def places(self, number: Index) -> Mask:
         """Whether the crank angles of these requests are wanted."""
-        wanted: Mask = np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
-        return wanted
+        return np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
 
     def block(self, rows: Index, samples: int) -> None:
         """Sample some designs, and refine those that the samples resolve."""
@@ -290,8 +288,7 @@ class PeakSearch:
     def _orders(self, candidates: PeakCandidates) -> Index:
         """Order of derivative of each candidate; a discriminant rounds like a position."""
         orders = [0 if self.anywhere else rounding.order_of(self.family, r.pose) for r in self.requests]
-        found: Index = np.array(orders)[candidates.request]
-        return found
+        return np.array(orders)[candidates.request]
 
     def _within_window(
         self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask

@@ -250,8 +250,7 @@ def _kink(values: Array, bent: float) -> Array:
     left, middle, right = a - 2.0 * b + c, b - 2.0 * c + d, c - 2.0 * d + e
     change = np.maximum(np.abs(middle - left), np.abs(right - middle))
     largest = np.maximum(np.maximum(np.abs(left), np.abs(right)), np.abs(middle))
-    found: Array = np.where(change > bent * largest, change, 0.0)
-    return found
+    return np.where(change > bent * largest, change, 0.0)
 
 
 def _quartic(values: Array) -> tuple[Array, Array, Array, Array]:

@@ -53,8 +53,7 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
         near = nearest(family, designs, outputs, MATTERS) if near is None else near
         rho = near.rho.min(axis=1)
         factor = np.where(rho < FAR, np.maximum(factor, PER_SINGULARITY / (FEWEST * rho)), factor)
-    found: Array = np.exp2(np.ceil(np.log2(np.minimum(factor, MOST))))
-    return found
+    return np.exp2(np.ceil(np.log2(np.minimum(factor, MOST))))
 
 
 def nearest(family: Family, designs: Array, outputs: Collection[str], within: float = FAR) -> Singularities:

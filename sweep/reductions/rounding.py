@@ -100,8 +100,7 @@ def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
 
 def _of_order(order: Index, amplified: Array) -> Array:
     """Share of rounding: a derivative of order n grows like the power 1/2 - n of the vanishing quantity."""
-    found: Array = 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
-    return found
+    return 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
 
 
 def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
@@ -165,8 +164,7 @@ def order_of(family: Family, pose: str) -> int:
 
 def tells(discriminant: Array) -> Mask:
     """Whether a discriminant is within the range of float64: at scales such as 1e100 or 1e-80 it is not."""
-    usable: Mask = (discriminant > 1e-280) & (discriminant < 1e280)
-    return usable
+    return (discriminant > 1e-280) & (discriminant < 1e280)
 
 
 SPACING = 1.0 / 6.0  # of poses, relative to the distance of the nearest singularity

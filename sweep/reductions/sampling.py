@@ -74,8 +74,7 @@ def continued(family: Family, name: str, values: Array, middle: Array) -> Array:
     """Add full turns to poses of an output that wraps, so that they are near ``middle``; others stay as they are."""
     if not family.pose_output[name].wraps:
         return values
-    near: Array = values + TWO_PI * np.rint((middle - values) / TWO_PI)
-    return near
+    return values + TWO_PI * np.rint((middle - values) / TWO_PI)
 
 
 def unwrapped(row: Index, values: Array) -> tuple[Array, Mask]:

@@ -191,8 +191,7 @@ def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
     sign = family.outward_sign(position)
     if not sign:
         return np.ones(len(designs), np.bool_)
-    outward: Mask = designs[:, family.parameter_names.index(sign)] > 0.0
-    return outward
+    return designs[:, family.parameter_names.index(sign)] > 0.0
 
 
 def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
