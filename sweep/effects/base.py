@@ -15,6 +15,7 @@ from sweep.families import NAMES as FAMILY_NAMES
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import JointRecords, OutputLink, ToolPoint
+from sweep.families.curve_features import Bends
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import ends_in_digit
 
@@ -89,20 +90,6 @@ def largest(compute: ComputeFunction, name: str, quantity: str, threshold: float
     return advise
 
 
-@dataclass(frozen=True)
-class Bend:
-    """Functions of the crank angle at whose zeros some pose outputs of an effect have kinks, jumps or narrow peaks.
-
-    ``curves(scene)`` gives their values, (n, m, q); ``outputs`` are the effect's own names.  ``squares`` are
-    non-negative functions, whose near zeros count.  With ``zero`` the outputs are non-negative and vanish there, too.
-    """
-
-    outputs: tuple[str, ...]
-    curves: Callable[[Scene], Array]
-    squares: bool = False
-    zero: bool = False
-
-
 def tool_place(family: Family) -> int | None:
     """Find the place of a tool on a family with joint records: ON_LINE, ON_COUPLER or ON_TIP; else None."""
     if family.find(JointRecords) is None:
@@ -156,7 +143,7 @@ class Effect:
     tree: LinkTree | None = None
     carried_at: int | None = None
     only_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    bends: tuple[Bend, ...] = ()
+    bends: tuple[Bends, ...] = ()
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
         """List the inputs for a family, with those of a tool if the family has a place for one."""

@@ -12,13 +12,14 @@ from kernels import status as st
 from kernels.effects.bearings import bearing_loads
 from kernels.types import EPS, TWO_PI, Status
 from sweep.effects import loads
-from sweep.effects.base import Bend, DesignResult
+from sweep.effects.base import DesignResult
 from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.load_effects import KINETOSTATICS
 from sweep.effects.load_passing import reactions
 from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Accuracy, Array, Columns, Output, floats
 from sweep.families.capabilities import Assembly
+from sweep.families.curve_features import Bends
 from sweep.families.poses import chosen, filled_all
 from sweep.numerics.curves import TableCurve
 from sweep.numerics.events import sign_changes, with_events
@@ -110,13 +111,13 @@ class BearingShaft:
         return filled_all(bearing_loads, arguments, names, wanted & frozenset(names), status)
 
 
-def bends(shaft: BearingShaft, *more: str) -> tuple[Bend, ...]:
+def bends(shaft: BearingShaft, *more: str) -> tuple[Bends, ...]:
     """Kinks of the equivalent loads of a shaft's bearings, and of outputs computed from them.
 
     They occur where the equivalent load changes its formula, and where a support is nearly unloaded.
     """
-    names = (*load_names(shaft.name)[3:], *more)
-    return Bend(names, partial(formula, shaft=shaft)), Bend(names, partial(squares, shaft=shaft), squares=True)
+    names = frozenset((*load_names(shaft.name)[3:], *more))
+    return Bends(names, partial(formula, shaft=shaft)), Bends(names, partial(squares, shaft=shaft), squares=True)
 
 
 def per_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy, shaft: BearingShaft) -> Columns:

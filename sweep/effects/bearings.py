@@ -9,11 +9,12 @@ from functools import partial
 import numpy as np
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import Bend, ComputeFunction, Effect, largest
+from sweep.effects.base import ComputeFunction, Effect, largest
 from sweep.effects.loads import SPEED, together
 from sweep.effects.pressure import components
 from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Output, Parameter
+from sweep.families.curve_features import Bends
 from sweep.families.poses import filled_all, filled_each
 
 EQUATION = "B1 (1)-(4)"
@@ -146,7 +147,7 @@ def permissible_load(scene: Scene, tail: str = "") -> Array:
 
 def _effect(
     name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
-    bends: tuple[Bend, ...], kind: str = "",
+    bends: tuple[Bends, ...], kind: str = "",
 ) -> Effect:  # fmt: skip
     return Effect(
         key="B1",
@@ -175,8 +176,8 @@ _SLIDING_LIMITS = partial(_compute, permissible.bearing_limits, SLIDING_INPUTS, 
 _ROLLING_LIMITS = partial(_compute, permissible.bearing_limits, ROLLING_INPUTS, ROLLING_LIMITS, permissible_load)
 
 
-def _bent(results: tuple[Output, ...], curves: Callable[[Scene], Array]) -> Bend:
-    return Bend(tuple(o.name for o in results), curves)
+def _bent(results: tuple[Output, ...], curves: Callable[[Scene], Array]) -> Bends:
+    return Bends(frozenset(o.name for o in results), curves)
 
 
 SLIDING = _effect(

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import Array
-from sweep.effects.base import Bend, Effect, largest
+from sweep.effects.base import Effect, largest
 from sweep.effects.contact import MODULUS, line_stress
 from sweep.effects.load_effects import loads_of
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.scene import Scene, take_over
 from sweep.families import family
 from sweep.families.base import Columns, Output, Parameter, floats
+from sweep.families.curve_features import Bends
 
 EQUATION = "docs/cam.md (12)-(14)"
 FORMULAS = (
@@ -97,7 +98,7 @@ def roller_of(name: str) -> Effect:
         only_for={p.name: ("stress_r",) for p in (*bare.inputs, LENGTH, MODULUS)},
         outputs=OUTPUTS,
         compute=compute,
-        bends=(Bend(("stress_r",), normal_force, zero=True),),
+        bends=(Bends(frozenset(("stress_r",)), normal_force, zero=True),),
         called_for="a cam that can be made, wear of the roller",
         negligible="a pitch curve whose least radius is far above the roller's",
         advise=largest(compute, "undercut", "undercut", 0.3),

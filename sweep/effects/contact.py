@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
-from sweep.effects.base import Bend, Effect, largest
+from sweep.effects.base import Effect, largest
 from sweep.effects.link_loads import tree_of
 from sweep.effects.load_effects import axis_of, loads_of, relative
 from sweep.effects.load_passing import compute_loads
@@ -18,6 +18,7 @@ from sweep.effects.loads import magnitude
 from sweep.effects.scene import Scene, refuse, take_over
 from sweep.families import family
 from sweep.families.base import Columns, Output, Parameter, floats
+from sweep.families.curve_features import Bends
 from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.sites import AXES
 
@@ -145,7 +146,7 @@ def contact_of(name: str) -> Effect:
         outputs=tuple(o for joint in joints for o in _outputs(joint)),
         compute=compute,
         bends=tuple(
-            Bend(tuple(o.name for o in _outputs(joint)[1:]), partial(_across, joint=joint), zero=True)
+            Bends(frozenset(o.name for o in _outputs(joint)[1:]), partial(_across, joint=joint), zero=True)
             for joint in joints
             if joint.touch != "strap"
         ),

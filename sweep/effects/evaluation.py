@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from kernels.effects.coupler import DRIVING
 from kernels.types import Status
-from sweep.effects.base import Bend, PlacedEffect
+from sweep.effects.base import PlacedEffect
 from sweep.effects.scene import Scene, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
 from sweep.families.capabilities import ThreadPath
@@ -110,7 +110,7 @@ def run_design(
     return {"status": whole["status"]} | {name: whole[own] for name, own in pairs if own in whole}
 
 
-def bend_curves(added: Added, placed: PlacedEffect, bend: Bend, designs: Array, angles: Angles) -> Array:
+def bend_curves(added: Added, placed: PlacedEffect, bend: Bends, designs: Array, angles: Angles) -> Array:
     """Evaluate the functions at whose zeros outputs of an effect bend, (n, m, q), block by block."""
     shape = len(designs), angles.cos.shape[1]
     found: list[Array] = []
@@ -178,8 +178,8 @@ def bends(added: Added, effects: tuple[PlacedEffect, ...]) -> list[Bends]:
     precise, found = replace(added, family=added.family.precise()), []
     for placed in effects:
         for bend in placed.entry.bends:
-            of = frozenset(name for name, own in placed.own.items() if own in bend.outputs)
-            found += [Bends(of, partial(bend_curves, precise, placed, bend), bend.squares, bend.zero)] if of else []
+            of = frozenset(name for name, own in placed.own.items() if own in bend.of)
+            found += [replace(bend, of=of, curves=partial(bend_curves, precise, placed, bend))] if of else []
     return found
 
 

@@ -14,14 +14,16 @@ import numpy as np
 from kernels import status as st
 from kernels.effects.coupler import CouplerMotion, coupler_point
 from sweep.effects import kinetostatics, link_loads, loads
-from sweep.effects.base import Advice, Bend, Effect, largest
+from sweep.effects.base import Advice, Effect, largest
 from sweep.effects.link_loads import rod, tree_of
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene
 from sweep.families import family
 from sweep.families.base import Array, Output
+from sweep.families.curve_features import Bends
 from sweep.families.link_tree import LinkJoint, LinkTree
+from sweep.families.outputs import kinked
 from sweep.numerics.records import Index
 
 _V, _OMEGA, _ALONG, _PLACE = slice(3, 6), slice(9, 12), slice(15, 18), slice(24, 27)  # of bodies.PER_BODY
@@ -37,10 +39,10 @@ def ball_slowness(scene: Scene) -> Array:
     return np.stack([((omega - other) ** 2).sum(axis=2) for other in (crank, of_follower)], axis=2)
 
 
-def tree_bends(tree: LinkTree, outputs: tuple[str, ...]) -> tuple[Bend, ...]:
+def tree_bends(tree: LinkTree, outputs: tuple[str, ...]) -> tuple[Bends, ...]:
     """Bends of outputs with friction: where a shaft reverses, and where another joint nearly stops."""
-    found = [Bend(outputs, reversals)]
-    return (*found, Bend(outputs, slowness, squares=True)) if _others(tree) else tuple(found)
+    found = Bends(frozenset(outputs), reversals), Bends(frozenset(outputs), slowness, squares=True)
+    return found if _others(tree) else found[:1]
 
 
 def reversals(scene: Scene) -> Array:
@@ -172,10 +174,6 @@ def _advise_tree(scene: Scene) -> Advice | None:
     return _share_of_inertia(scene, "drive_torque", partial(np.ptp, axis=1), words)
 
 
-def _with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
-    return tuple(replace(o, kinks=not o.jumps) for o in outputs)
-
-
 def _closed(kind: loads.Follower) -> Effect:
     return Effect(
         key=LOADS,
@@ -204,7 +202,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
     vectors = kinetostatics.vectors(kind.name, FRICTION_SUFFIX, FRICTION_TEXT)
     scalars = kinetostatics.COUPLES_WITH_FRICTION | kinetostatics.losses(kind)
     contraction = "rho(L), bound of its rate; below 1 the solution is unique"
-    outputs = _with_kinks((
+    outputs = kinked((
         *loads.vector_outputs(vectors, equation),
         *loads.scalar_outputs(scalars, equation, *loads.PASSES),
         Output(kinetostatics.CONTRACTION, "1", contraction, equation),
@@ -223,7 +221,7 @@ def _closed_friction(kind: loads.Follower) -> Effect:
         called_for="losses, drive sizing, a check against jamming",
         negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
         takes_load=FRICTION,
-        bends=(Bend(tuple(o.name for o in outputs), ball_slowness, squares=True),),
+        bends=(Bends(frozenset(o.name for o in outputs), ball_slowness, squares=True),),
         advise=largest(compute_friction, kinetostatics.CONTRACTION, "contraction rho(L)", 0.01),
     )
 
@@ -261,7 +259,7 @@ def friction_of(name: str) -> Effect:
     torque = {link_loads.TORQUE_WITH_FRICTION: ("torque", f"torque that drives the cranks{FRICTION_TEXT}")}
     supports = {at: ("force", words) for at, (_, _, words) in link_loads.support_loads(tree).items()}
     scalars = torque | link_loads.losses(tree) | supports
-    outputs = _with_kinks((
+    outputs = kinked((
         *loads.vector_outputs(link_loads.vectors(tree, FRICTION_SUFFIX, FRICTION_TEXT), TREE_FRICTION_EQUATION),
         *loads.scalar_outputs(scalars, TREE_FRICTION_EQUATION, *loads.PASSES),
     ))  # fmt: skip

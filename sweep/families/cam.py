@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from kernels.families import cam
@@ -11,7 +9,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Dimensions, Link, MovingPoint, OutputLink, Skeleton
 from sweep.families.curve_features import Switches
-from sweep.families.outputs import coordinate_outputs, ladders
+from sweep.families.outputs import coordinate_outputs, kinked, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
 from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import ORIGIN, X, dimensions, line, links, parameter, standing
@@ -54,11 +52,6 @@ ROLLER_OUTPUTS = (
 _LAW = ("rise", "dwell", "fall", "start", "law")
 
 
-def with_kinks(outputs: tuple[Output, ...]) -> tuple[Output, ...]:
-    """Mark the outputs of a cam as kinked, since its phases meet in kinks or jumps; angles are left unmarked."""
-    return tuple(replace(o, kinks=not o.wraps) for o in outputs)
-
-
 def phase_ends(designs: Array) -> Array:
     """Cam angles at which a phase, or a piece of the modified sine, begins or ends, (n, 8); 0 for a Fourier table."""
     rise, dwell, fall, start, kind = dimensions(PARAMETERS, designs, *_LAW)
@@ -96,7 +89,7 @@ FAMILY = Family(
     title="cam with a sliding roller follower",
     parameters=PARAMETERS,
     position="s",
-    pose_outputs=with_kinks(PROFILE_OUTPUTS + ROLLER_OUTPUTS),
+    pose_outputs=kinked(PROFILE_OUTPUTS + ROLLER_OUTPUTS),  # the phases of a cam meet in kinks or jumps
     poses=poses,
     uses_phi=True,
     example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
@@ -144,7 +137,7 @@ LEVER = Family(
     title="cam with a roller on a swinging lever",
     parameters=LEVER_PARAMETERS,
     position="psi",
-    pose_outputs=with_kinks(LEVER_OUTPUTS),
+    pose_outputs=kinked(LEVER_OUTPUTS),
     poses=lever_poses,
     uses_phi=True,
     example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},

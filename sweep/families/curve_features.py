@@ -24,7 +24,7 @@ NARROWEST = 1e-9  # angles [rad] closer than this count as one
 SAMPLES_PER_WAVE = 32.0  # of a mechanism: they resolve its order and the next fifteen multiples
 
 T = TypeVar("T")
-Feature = TypeVar("Feature", "Waves", "Switches", "Singular")
+Feature = TypeVar("Feature", "Waves", "Switches", "Singular", "Crossing", "Bends")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
 
@@ -82,16 +82,16 @@ class Switches:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Jump of outputs where the pose output ``of`` passes ``level(designs)``, (n,), in designs where it ``matters``.
+    """Jump where the pose output ``passing`` passes ``level(designs)``, (n,), in designs where it ``matters``.
 
     A tool that pierces is loaded from there to its turning point, perhaps for less of the turn than the spacing of two
-    samples.  ``felt`` names the pose outputs that may jump.
+    samples.  ``of`` names the pose outputs that may jump.
     """
 
-    of: str
+    passing: str
     level: DesignMap
     matters: Callable[[Array], NDArray[np.bool_]]
-    felt: frozenset[str]
+    of: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -100,13 +100,14 @@ class Bends:
 
     ``curves(designs, angles)`` returns their values, (n, m, q).  For example, a bearing's load changes its formula
     where the axial load exceeds a share of the radial one, friction reverses where a joint stops, and the permissible
-    value of a bearing has a narrow peak where no axial load acts.  ``squares`` are non-negative functions, whose near
+    value of a bearing has a narrow peak where no axial load acts.  In the entry of an effect ``of`` are its own names,
+    and ``curves(scene)`` gets a scene.  ``squares`` are non-negative functions, whose near
     zeros count: the direction of a velocity changes abruptly there.  With ``zero`` the outputs are non-negative and
     vanish at the zeros: the pressure of a contact goes like a root of its force.
     """
 
     of: frozenset[str]
-    curves: Callable[[Array, Angles], Array]
+    curves: Callable[..., Array]
     squares: bool = False
     zero: bool = False
 
@@ -143,15 +144,10 @@ def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     return np.where(np.isfinite(angles), angles, 0.0)
 
 
-def crossings(family: Family, outputs: Collection[str]) -> list[Crossing]:
-    """List the crossings at which one of the given pose outputs jumps."""
-    return [known for known in family.every(Crossing) if not known.felt.isdisjoint(outputs)]
-
-
 def crossed(family: Family, designs: Array, outputs: Collection[str]) -> NDArray[np.bool_]:
     """Whether a design has a crossing at which one of the given pose outputs jumps, (n,)."""
     found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
-    for known in crossings(family, outputs):
+    for known in about(family, Crossing, outputs):
         found = found | known.matters(designs)
     return found
 
@@ -174,11 +170,6 @@ def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> A
     least = PER_GAP * np.maximum(TWO_PI / narrowest, waves(family, designs, outputs))
     least = np.maximum(least, samples_of_waves(family, designs))
     return np.where(crossed(family, designs, outputs), np.inf, least)
-
-
-def bends(family: Family, output: str) -> tuple[Bends, ...]:
-    """List the bends of curves of a pose output."""
-    return tuple(known for known in family.every(Bends) if output in known.of)
 
 
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:
@@ -271,7 +262,7 @@ def of_members(members: Sequence[Member], sums: frozenset[str]) -> list[object]:
 
 def _of_part(member: Member, known: Crossing, sums: frozenset[str]) -> Crossing:
     level, matters = partial(on_part, member.designs, known.level), partial(on_part, member.designs, known.matters)
-    return Crossing(f"{member.name}.{known.of}", level, matters, _named(member, known.felt, sums) or frozenset())
+    return Crossing(f"{member.name}.{known.passing}", level, matters, _named(member, known.of, sums) or frozenset())
 
 
 def _named(member: Member, names: frozenset[str] | None, sums: frozenset[str]) -> frozenset[str] | None:

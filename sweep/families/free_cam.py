@@ -12,7 +12,7 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, March, Output, Parameter, floats
 from sweep.families.capabilities import Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Bends
-from sweep.families.outputs import ladders
+from sweep.families.outputs import kinked, ladders
 from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
@@ -101,7 +101,7 @@ FAMILY = Family(
     title="thread take-up by the bare edge of a turning cam, without friction",
     parameters=PARAMETERS,
     position="P",
-    pose_outputs=tuple(replace(o, kinks=not o.jumps) for o in POSE_OUTPUTS),  # where the thread comes to lie and leaves
+    pose_outputs=kinked(POSE_OUTPUTS),  # where the thread comes to lie and leaves
     poses=poses,
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
     example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 from sweep.families.base import Output
@@ -67,6 +68,11 @@ def joint_outputs(
         for name, text in joints.items()
         for axis, way in zip(AXES, ways, strict=False)
     )
+
+
+def kinked(outputs: Iterable[Output]) -> tuple[Output, ...]:
+    """Mark outputs whose curves have kinks or jumps; angles and whole numbers are left unmarked."""
+    return tuple(replace(o, kinks=not (o.wraps or o.jumps)) for o in outputs)
 
 
 def ladders(*names: str, orders: int = 3) -> dict[str, str]:

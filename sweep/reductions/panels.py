@@ -16,7 +16,7 @@ import numpy as np
 from kernels import status as st
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
-from sweep.families.curve_features import Bends, Singular, Smooth, about, bends
+from sweep.families.curve_features import Bends, Singular, Smooth, about
 from sweep.numerics.chebyshev import NODES
 from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, Curves, Top, climbed, fitted, measured, places
 from sweep.numerics.records import Index
@@ -76,7 +76,7 @@ def _cut_alike(family: Family, requests: Sequence[Request]) -> list[list[Request
     """Group the requests whose curves are cut at the same crank angles."""
     groups: dict[tuple[Bends, ...], list[Request]] = {}
     for request in requests:
-        groups.setdefault(bends(family, request.pose), []).append(request)
+        groups.setdefault(tuple(about(family, Bends, (request.pose,))), []).append(request)
     return list(groups.values())
 
 

@@ -115,7 +115,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     edges = with_events(edges, np.repeat(close, about.shape[1]), about.ravel())
     angles = crowded(only(near, close), LOOK)
     edges = with_events(edges, *_passed(family, designs, (output,), _looked(n, looks, close, angles)))
-    for bent in features.bends(family, output):
+    for bent in features.about(family, Bends, (output,)):
         edges = with_events(edges, *_bent(bent, designs, _looked(n, BENDING, close, angles)))
     return edges
 
@@ -128,7 +128,8 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
     looked = np.tile(np.arange(looks) * (TWO_PI / looks), (len(designs), 1))
     found = [_passed(family, designs, outputs, looked)]
     # Near the minimum of a squared function a curve is steep, but has no kink.
-    known = dict.fromkeys(bent for output in outputs for bent in features.bends(family, output) if not bent.squares)
+    about = (bent for output in outputs for bent in features.about(family, Bends, (output,)))
+    known = dict.fromkeys(bent for bent in about if not bent.squares)
     found += [_bent(bent, designs, looked) for bent in known]
     rows, phi = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return rows, phi
@@ -137,7 +138,7 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
 def zeros(family: Family, designs: Array, output: str) -> tuple[Index, Array]:
     """Find designs (k,) and angles (k,) where a non-negative pose output is known to vanish, or jumps."""
     looked = _looked(len(designs), BENDING, np.zeros(0, np.intp), np.zeros((0, 0)))
-    found = [_bent(bent, designs, looked) for bent in features.bends(family, output) if bent.zero]
+    found = [_bent(bent, designs, looked) for bent in features.about(family, Bends, (output,)) if bent.zero]
     return found[0] if found else (np.zeros(0, np.intp), np.zeros(0))
 
 
@@ -152,16 +153,16 @@ def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
 
 def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:
     """Find designs and angles where an output passes its level or a speed passes zero, bracketed by ``looked``."""
-    passed_levels = features.crossings(family, outputs)
+    passed_levels = features.about(family, features.Crossing, outputs)
     # Reversals affect friction and loads, which belong to effects; a family knows its own kinks.
     speeds = () if family.dear.keys().isdisjoint(outputs) else reversing(family)
     if not speeds and not passed_levels:
         return np.zeros(0, np.intp), np.zeros(0)
-    names = list(dict.fromkeys([*speeds, *(crossing.of for crossing in passed_levels)]))
+    names = list(dict.fromkeys([*speeds, *(crossing.passing for crossing in passed_levels)]))
 
     def functions(rows: Index, phi: Array) -> Array:
         columns, _ = pose_columns(family, designs[rows], phi, names)
-        passed = [columns[crossing.of] - crossing.level(designs[rows])[:, None] for crossing in passed_levels]
+        passed = [columns[crossing.passing] - crossing.level(designs[rows])[:, None] for crossing in passed_levels]
         return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
 
     return sign_changes(functions, looked)

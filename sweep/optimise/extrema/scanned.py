@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kernels.types import TWO_PI
 from sweep.families.base import Array, Family, Interval
-from sweep.families.curve_features import Singular, Switches, Waves, crossed, crossings, switches
+from sweep.families.curve_features import Crossing, Singular, Switches, Waves, about, crossed, switches
 from sweep.reductions.resolution import FEWEST, denser, events
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def may_bend(family: Family, outputs: tuple[str, ...]) -> bool:
     """Return whether some of the pose outputs have kinks or jumps in some design."""
     if isinstance(family.domain, Interval):
         return False
-    return bool(crossings(family, outputs)) or any(_bends(family, name) for name in outputs)
+    return bool(about(family, Crossing, outputs)) or any(_bends(family, name) for name in outputs)
 
 
 def bending(family: Family, design: Array, outputs: tuple[str, ...]) -> list[int]:
