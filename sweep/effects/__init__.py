@@ -128,7 +128,7 @@ def applicable(family: Family) -> tuple[PlacedEffect, ...]:
     return tuple(
         p
         for p in found
-        if not p.entry.takes_load or p.entry.may_drive_nothing or len(_carriers(family, p)) == len(stages) - 1 - p.stage
+        if not p.entry.takes_load or p.entry.may_drive_nothing or p.stage == len(stages) - 1 or _handing(family, p)
     )
 
 
@@ -150,20 +150,15 @@ def _effect_names(family: Family) -> frozenset[str]:
     return frozenset(o.name for placed in applicable(family) for o in placed.outputs)
 
 
-def _carriers(family: Family, placed: PlacedEffect) -> list[PlacedEffect]:
-    """Effects of the later stages that return the load on this one."""
+def _handing(family: Family, placed: PlacedEffect) -> list[PlacedEffect]:
+    """Effects of all later stages that return the load on this one; empty if one of these stages has none."""
     key = placed.entry.takes_load
-    return [
+    found = [
         PlacedEffect(entry, k, stage.tail, False)
         for k, stage in enumerate(family.stages)
         for entry in serving(stage.family)
         if key and k > placed.stage and entry.key == key
     ]
-
-
-def _handing(family: Family, placed: PlacedEffect) -> list[PlacedEffect]:
-    """Effects of all later stages that return the load on this one; empty if one of these stages has none."""
-    found = _carriers(family, placed)
     return found if len(found) == len(family.stages) - 1 - placed.stage else []
 
 

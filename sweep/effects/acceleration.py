@@ -6,6 +6,7 @@ has kinks there at most.  So the turn is solved once, and the acceleration searc
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,10 +32,7 @@ TARGET = 1e-8  # relative accuracy of the search where none is asked for
 
 def rubbing_torque(scene: Scene, speed: Array, change: Array, status: Status) -> Array:
     """Compute the driving torque with friction minus that without, at the given speed; update ``status`` (n,)."""
-    uneven = speed, change
-    turning = Scene(
-        scene.family, scene.designs, scene.angles, scene.inputs, scene.after, curves=scene.curves, uneven=uneven
-    )
+    turning = replace(scene, before=None, uneven=(speed, change), memo={})
     rubbing = compute_friction(turning, frozenset({"drive_torque_friction"}))
     smooth = compute_loads(turning, frozenset({"drive_torque"}))
     worst = np.asarray(rubbing["status"], np.uint8).max(axis=1)

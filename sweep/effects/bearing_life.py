@@ -110,6 +110,11 @@ class BearingShaft:
         arguments = (forces, *self.columns, np.ascontiguousarray(self.axis(scene)), self.data(scene))
         return filled_all(bearing_loads, arguments, names, wanted & frozenset(names), status)
 
+    def values(self, scene: Scene, which: slice) -> list[Array]:
+        """Compute some of these loads, (n, m) each."""
+        names = load_names(self.name)[which]
+        return floats(self.loads(scene, frozenset(names)), *names)
+
 
 def bends(shaft: BearingShaft, *more: str) -> tuple[Bends, ...]:
     """Kinks of the equivalent loads of a shaft's bearings, and of outputs computed from them.
@@ -183,9 +188,7 @@ def _switches(scene: Scene, shaft: BearingShaft) -> Array:
 
     They are the shaft's turning, the axial load, and its excess over the part e V of the radial load of its bearing.
     """
-    names = load_names(shaft.name)[:3]
-    found = shaft.loads(scene, frozenset(names))
-    first, second, axial = floats(found, *names)
+    first, second, axial = shaft.values(scene, slice(3))
     radial = np.where(shaft.given(scene, "axial_support")[:, None] == 1.0, first, second)
     limit = (shaft.given(scene, "e_limit") * shaft.given(scene, "rotation_factor"))[:, None] * radial
     return np.stack([shaft.turning(scene), axial, np.abs(axial) - limit], axis=2)
@@ -213,9 +216,7 @@ def formula(scene: Scene, shaft: BearingShaft) -> Array:
 
 def squares(scene: Scene, shaft: BearingShaft) -> Array:
     """Squares of the supports' radial loads, (n, m, 2)."""
-    names = load_names(shaft.name)[:2]
-    found = shaft.loads(scene, frozenset(names))
-    return np.stack([np.square(np.asarray(found[name], np.float64)) for name in names], axis=2)
+    return np.stack([np.square(load) for load in shaft.values(scene, slice(2))], axis=2)
 
 
 def _discriminant(scene: Scene, rows: Index, stage: int, name: str, which: Index, phi: Array) -> Array:

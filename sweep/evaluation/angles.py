@@ -6,21 +6,18 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI
 from sweep.errors import InputError
-from sweep.evaluation.tables import Parametrised, numbers
+from sweep.evaluation.tables import Parametrised, Table, numbers
 from sweep.families.base import Domain, Parameter
 from sweep.families.names import stem
 from sweep.families.parameter import reads_as_degrees
 from sweep.quantities.units import heading_factor, internal_unit, plain
-
-if TYPE_CHECKING:
-    from sweep.evaluation.tables import Table
 
 AngleUnit: TypeAlias = Literal["rad", "deg"]
 

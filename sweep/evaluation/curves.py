@@ -2,39 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from typing import NamedTuple
-
 from sweep.families.base import Family
 from sweep.families.capabilities import Assembly
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.relations import Relation
 from sweep.families.machines.shaking import Shaking
-from sweep.families.names import parts
 from sweep.families.sites import AXES
-
-_OF_FAMILY = re.compile(r"([xyz])_([a-z][a-z_]*)")
-_OF_MACHINE = re.compile(r"([a-z][a-z_0-9]*)_([xyz])")
-
-
-class Coordinate(NamedTuple):
-    """Coordinate of a joint: stage or member of its frame, joint and axis."""
-
-    part: str
-    joint: str
-    axis: str
-
-
-def coordinate(name: str) -> Coordinate | None:
-    """Parse a coordinate's name: ``x_b2`` of stage 2, ``looper.tip_z`` in the machine's frame; else None."""
-    member, stem, stage = parts(name)
-    match = _OF_MACHINE.fullmatch(stem) if member else _OF_FAMILY.fullmatch(stem)
-    if match is None:
-        return None
-    if member:
-        return Coordinate(member, match[1], match[2])
-    return Coordinate(stage, match[2], match[1])
 
 
 def motion_curves(family: Family) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from kernels.types import TWO_PI, Array
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.summaries import design_outputs
-from sweep.evaluation.tables import one_design
+from sweep.evaluation.tables import Table, one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Columns, Family, March
@@ -26,8 +26,6 @@ from sweep.quantities.resolve import event_names
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 Row = tuple[str, str, str, float, float, float]
 AWAY = {PLATE: ("dwell", "low", 0.0), FLIGHT: ("flight", "flies", float("nan"))}  # states of a foot off the rack

@@ -14,7 +14,7 @@ from kernels.status import OK
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.poses import check_march
-from sweep.evaluation.tables import numbers, one_design
+from sweep.evaluation.tables import Table, numbers, one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
@@ -27,8 +27,6 @@ from sweep.families.sites import AXES, TIP
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 UNITS = {"phi": "rad", "x": "length", "y": "length", "z": "length"}
 

@@ -15,7 +15,7 @@ from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
-from sweep.evaluation.tables import design_matrix, kept_columns, numbers, plain_columns, wanted_names
+from sweep.evaluation.tables import Table, design_matrix, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Domain, Family, March
@@ -23,8 +23,6 @@ from sweep.quantities.resolve import output, output_names
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 
 def evaluate(

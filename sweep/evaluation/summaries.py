@@ -16,7 +16,7 @@ from sweep.evaluation.poses import query_of
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
-from sweep.evaluation.tables import design_matrix, kept_columns, plain_columns
+from sweep.evaluation.tables import Table, design_matrix, kept_columns, plain_columns
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, March
@@ -26,8 +26,6 @@ from sweep.reductions.steps import check_certifiable, proofs
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 __all__ = ["Route", "design_outputs", "output", "output_names", "routes", "summarise"]
 

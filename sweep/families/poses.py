@@ -140,14 +140,9 @@ def on_matrix(poses: PoseFunction, matrix: DesignMap) -> PoseFunction:
     return lambda designs, angles, wanted: poses(matrix(designs), angles, wanted)
 
 
-def optional_outputs(
-    names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...], dtype: DTypeLike = np.float64
-) -> list[Array | None]:
-    """Return an empty array for each wanted name and None for the others, in the order of a kernel's out arguments.
-
-    ``dtype`` is complex128 where the designs or angles are (exact gradients by the complex step).
-    """
-    return [np.empty(shape, dtype) if name in wanted else None for name in names]
+def optional_outputs(names: tuple[str, ...], wanted: frozenset[str], shape: tuple[int, ...]) -> list[Array | None]:
+    """Return an empty array for each wanted name and None for the others, in the order of a kernel's out arguments."""
+    return [np.empty(shape) if name in wanted else None for name in names]
 
 
 MANY = 2**16  # poses of one call: dense samples, or the price of an output being measured

@@ -70,6 +70,7 @@ MAXIMA_OUTPUTS = tuple(
     )
 )
 
+RATES = ("dpsi", "d2psi", "d3psi")
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up; 100 suffice within 1e-9 of a change point
 _poses = poses_of(rssr.poses, rssr.Outputs)
 
@@ -176,18 +177,18 @@ def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
 def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Compute maxima over the turn refined between samples to ``accuracy.target``, with error estimates."""
     assert accuracy.target is not None
-    n, names = len(designs), ("dpsi", "d2psi", "d3psi")
+    n = len(designs)
     status, error = np.empty(n, np.uint8), np.empty((3, n))
-    placed = not wanted.isdisjoint(f"phi_max_abs_{x}" for x in names)
+    placed = not wanted.isdisjoint(f"phi_max_abs_{x}" for x in RATES)
     phi, phi_error = (np.empty((3, n)), np.empty((3, n))) if placed else (None, None)
-    most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in names]
+    most = [np.empty(n) if wanted & {f"max_abs_{x}", f"phi_max_abs_{x}"} else None for x in RATES]
     rssr.true_maxima(designs, sampling_tables(), accuracy.target, status, phi, error, phi_error, *most)
     if phi is not None:
         # Perpendicular axes and g = 0: return and forward stroke are alike; of two maxima the first of the turn counts.
         even = (designs[:, 5] == 0.0) & (np.abs(np.cos(designs[:, 6])) < 1e-15)
         phi[:, even] = np.minimum(phi, TWO_PI - phi)[:, even]
     columns: Columns = {"status": status}
-    for order, name in enumerate(names):
+    for order, name in enumerate(RATES):
         for key, values, err in ((f"max_abs_{name}", most, error), (f"phi_max_abs_{name}", phi, phi_error)):
             column = None if values is None else values[order]
             if key in wanted and column is not None and err is not None:
@@ -205,7 +206,7 @@ def certified_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy)
     assert accuracy.target is not None
     n = len(designs)
     columns: Columns = {"status": np.zeros(n, np.uint8)}
-    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):  # of the velocity
+    for order, name in enumerate(RATES):  # of the velocity
         most, phi = f"max_abs_{name}", f"phi_max_abs_{name}"
         if not wanted & {most, phi}:
             continue
@@ -254,18 +255,16 @@ def sampled_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -
     cos, sin = _grid(accuracy.samples)
     columns: Columns = {}
     least, values = np.empty(n), np.empty(accuracy.samples)
-    together: list[Array | None] = [
-        np.empty(n) if f"max_abs_{name}" in wanted and f"phi_max_abs_{name}" not in wanted else None
-        for name in ("dpsi", "d2psi", "d3psi")
-    ]
-    if any(out is not None for out in together):
-        rssr.dense_maxima(designs, cos, sin, least, together[0], together[1], together[2])
-    for order, name in enumerate(("dpsi", "d2psi", "d3psi")):
-        most = together[order]
+    # Without a place all orders are computed together, a place by itself.
+    plain = [f"max_abs_{name}" in wanted and f"phi_max_abs_{name}" not in wanted for name in RATES]
+    highest = [np.empty(n) if one else None for one in plain]
+    if any(plain):
+        rssr.dense_maxima(designs, cos, sin, least, highest[0], highest[1], highest[2])
+    for order, name in enumerate(RATES):
+        most = highest[order]
         if f"phi_max_abs_{name}" in wanted:
             most, at = np.empty(n), np.empty(n, np.int64)
-            alone: list[Array | None] = [None, None, None]
-            alone[order] = most
+            alone = [most if k == order else None for k in range(3)]
             rssr.dense_maxima(designs, cos, sin, least, alone[0], alone[1], alone[2], at, values)
             columns[f"phi_max_abs_{name}"] = np.where(turns, at * step, np.nan)
         if most is not None and f"max_abs_{name}" in wanted:
@@ -279,10 +278,7 @@ def _grid(samples: int) -> tuple[Array, Array]:
     return np.cos(phi), np.sin(phi)
 
 
-CURVES = {
-    name: can.FusedOutput(order, can.constant(1.0, 0.0, 0.0))
-    for order, name in enumerate(("dpsi", "d2psi", "d3psi"), start=1)
-}
+CURVES = {name: can.FusedOutput(order, can.constant(1.0, 0.0, 0.0)) for order, name in enumerate(RATES, start=1)}
 SERIES = can.InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening)
 
 FAMILY = Family(

@@ -7,7 +7,7 @@ samples; all other curves, and undecided designs, are searched on poses alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -64,22 +64,37 @@ def true_extrema(
     """
     found: dict[Request, Extremum] = {}
     status = np.zeros(len(designs), np.uint8)
+    for part, now in _parts(family, designs, requests, target, locate, anywhere, window):
+        found |= part
+        status = np.where(status == st.OK, now, status)
+    lost = (status != st.OK) & (status != st.NOT_CONVERGED)
+    if lost.any():  # extrema of failed designs
+        for extremum in found.values():
+            for column in extremum:
+                column[lost] = np.nan
+    return found, status
+
+
+def _parts(
+    family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool, anywhere: bool,
+    window: Window | None,
+) -> Iterator[tuple[dict[Request, Extremum], Status]]:  # fmt: skip
+    """Yield the extrema in groups that are searched in the same way, each with the status that it gives the designs."""
     alike: dict[tuple[object, ...], list[Request]] = {}
     for request in requests:
         jumps = crossed(family, designs, () if anywhere else (request.pose,))
         alike.setdefault((jumps.tobytes(), *about(family, Singular, (request.pose,))), []).append(request)
     if len(alike) > 1:
         for some in alike.values():
-            part, now = true_extrema(family, designs, some, target, locate=locate, anywhere=anywhere, window=window)
-            found |= part
-            status = np.where(status == st.OK, now, status)
-        return _blanked(found, status), status
+            yield true_extrema(family, designs, some, target, locate=locate, anywhere=anywhere, window=window)
+        return
     jumping = crossed(family, designs, () if anywhere else [request.pose for request in requests])
     if jumping.any() and not jumping.all():
-        return _apart(family, designs, requests, target, locate, window, jumping)
-    left, kinked, opened = [], [], None
+        yield _apart(family, designs, requests, target, locate, window, jumping)
+        return
+    left, kinked, answered, opened = [], [], set[Request](), None
     for request in requests:
-        if request in found:
+        if request in answered:
             continue
         if not anywhere and panels.has_kinks(family, request, bool(jumping.any())):
             kinked.append(request)
@@ -101,26 +116,12 @@ def true_extrema(
             if rows.size:
                 slow, now[rows] = _searched(family, designs[rows], [one], target, locate, anywhere, None, HARD)
                 put(quick, rows, slow[one])
-            found[one], status = quick, np.where(status == st.OK, now, status)
+            answered.add(one)
+            yield {one: quick}, now
     if kinked:
-        cut, now = panels.extrema(family, designs, kinked, target, locate)
-        found |= cut
-        status = np.where(status == st.OK, now, status)
+        yield panels.extrema(family, designs, kinked, target, locate)
     if left:
-        slow, now = _searched(family, designs, left, target, locate, anywhere, window)
-        found |= slow
-        status = np.where(status == st.OK, now, status)
-    return _blanked(found, status), status
-
-
-def _blanked(found: dict[Request, Extremum], status: Status) -> dict[Request, Extremum]:
-    """Replace extrema of failed designs by nan, in place."""
-    lost = (status != st.OK) & (status != st.NOT_CONVERGED)
-    if lost.any():
-        for extremum in found.values():
-            for column in extremum:
-                column[lost] = np.nan
-    return found
+        yield _searched(family, designs, left, target, locate, anywhere, window)
 
 
 def _apart(

@@ -52,12 +52,8 @@ class FusedCurve:
     made_of: DesignMap
     scale: DesignMap | None = None
 
-    def extremum(self, designs: Array, target: float, opened: Opened | None = None) -> Answer:
-        """Compute the requested extremum of every design, as `extrema` does."""
-        return extrema((self,), designs, target, opened)[0]
-
     def mean(self, designs: Array, target: float) -> tuple[Array, Array, Status, Mask]:
-        """Compute root mean squares over the turn, their errors, status and undecided designs, as in `extremum`."""
+        """Compute root mean squares over the turn, their errors, status and undecided designs, as `extrema` does."""
         n, (given, made_of, along) = len(designs), self.given(designs, None)
         status, found = np.empty(n, np.uint8), np.empty((2, n))
         chains.mean_squares(_chained(self.forms), self.order, along)(

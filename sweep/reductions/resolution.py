@@ -200,7 +200,7 @@ class Turns(NamedTuple):
 
 @dataclass(frozen=True)
 class FourierCurve:
-    """Fourier series of the samples of a smooth curve of expensive poses, with the interface of `FusedCurve`.
+    """Fourier series of the samples of a smooth curve of expensive poses.
 
     Coefficients of a smooth periodic curve decay geometrically.  Their decay predicts the sum of those beyond the
     samples, which is the error, with a safety factor.

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from kernels import status as codes
 from sweep.dataset.chunk_files import batches
 from sweep.errors import InputError
-from sweep.evaluation.curves import coordinate, motion_curves
+from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import PlacedPart, extent, is_spatial, shown_name, side_by_side
 from sweep.families.base import Angles, Array, Family, Interval, equal_steps
@@ -144,7 +144,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
     if not shown or data.study.output.curves == "none":
         return None
     family = data.study.family
-    names = [x for x in dict.fromkeys(motion_curves(family)) if x == family.position or coordinate(x) is None]
+    names = list(dict.fromkeys(motion_curves(family)))
     motions = [_motion(data, placed, names) for placed in shown]
     interval = isinstance(family.domain, Interval)
     phase = " from the lowest position" if all(motion.from_lowest for motion in motions) else ""

@@ -76,7 +76,7 @@ def test_needles_that_stand_twice_at_one_end_are_left_to_no_slower_search():
     twice = 0
     for mode in (1, -1):
         curve = fused.curve_of(NEEDLE, Request("s", mode), False)
-        found, status, undecided = curve.extremum(designs, 1e-8)
+        found, status, undecided = fused.extrema((curve,), designs, 1e-8)[0]
         assert (status == st.OK).all() and undecided.mean() < 2e-3
         s = NEEDLE.poses(designs, Angles.of(TURN[None, ::8]), frozenset(["s"]))["s"]
         top = climbed(NEEDLE, designs, "s", mode, found.phi)
@@ -98,7 +98,7 @@ def test_a_largest_and_a_least_value_share_samples_and_keep_their_bits(of, pose,
     assert {curve.request for curve in curves} == set(both)
     found_together = fused.extrema(curves, designs, 1e-10)
     for request, (found, status, undecided) in zip([c.request for c in curves], found_together, strict=True):
-        alone, status_alone, undecided_alone = fused.curve_of(of, request, False).extremum(designs, 1e-10)
+        alone, status_alone, undecided_alone = fused.extrema((fused.curve_of(of, request, False),), designs, 1e-10)[0]
         assert {st.OK, st.NOT_ROTATABLE} <= set(status) and np.isfinite(found.value).sum() > 100
         np.testing.assert_array_equal(status, status_alone)
         np.testing.assert_array_equal(undecided, undecided_alone)

@@ -73,7 +73,7 @@ def assert_fused_margins_are_those_of_poses(family, designs, number):
     """Compare fused least discriminants of a later stage with the search on poses, within the errors of both."""
     request = Request(f"discriminant{number}", -1)
     loop = next(loop for loop in family.every(Assembly) if loop.stage == str(number))
-    found, _, undecided = fused.curve_of(family, request, True).extremum(designs, 1e-10)
+    found, _, undecided = fused.extrema((fused.curve_of(family, request, True),), designs, 1e-10)[0]
     slow, _ = extrema._searched(family, designs, [request], 1e-10, False, True, None)
     known, scale = ~undecided, loop.scale(designs)
     assert known.mean() > 0.98

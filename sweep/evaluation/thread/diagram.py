@@ -10,7 +10,7 @@ from kernels.types import TWO_PI
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, in_radians
 from sweep.evaluation.poses import evaluate
-from sweep.evaluation.tables import one_design
+from sweep.evaluation.tables import Table, one_design
 from sweep.evaluation.thread.rows import warn_outside
 from sweep.families import Mechanism
 from sweep.families import family as find_family
@@ -19,8 +19,6 @@ from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, Thr
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 BESIDE = 1e-9  # rad, from an event to the angles just before and after it
 COLUMNS = ("demand", "given", "surplus", "tension", "velocity")

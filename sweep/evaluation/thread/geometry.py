@@ -11,6 +11,7 @@ from kernels.families import eyelet as eyelet_kernels
 from kernels.families import free_cam as free_cam_kernels
 from kernels.families import guided_cam as guided_cam_kernels
 from kernels.status import OK, SINGULAR
+from sweep.evaluation.tables import Table
 from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of
 from sweep.families.base import Array, Parameter
 from sweep.families.eyelet import PARAMETERS as EYELET_PARAMETERS
@@ -18,8 +19,6 @@ from sweep.families.free_cam import PARAMETERS as FREE_CAM_PARAMETERS
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 
 def _lengths(names: str, text: str, default: float | None = None) -> tuple[Parameter, ...]:

@@ -10,15 +10,13 @@ import numpy as np
 
 from sweep.errors import MeasuredRangeWarning
 from sweep.evaluation.angles import in_radians
-from sweep.evaluation.tables import Parametrised, design_matrix
+from sweep.evaluation.tables import Parametrised, Table, design_matrix
 from sweep.evaluation.tables import Sheet as Sheet
 from sweep.families.base import Array, Parameter
 from sweep.families.machines.thread_balance import Range
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from sweep.evaluation.tables import Table
 
 
 def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:

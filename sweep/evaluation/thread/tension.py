@@ -16,7 +16,7 @@ from kernels.effects.thread import (
 from kernels.effects.thread import capstan as capstan_kernel
 from kernels.status import SINGULAR
 from sweep.errors import InputError
-from sweep.evaluation.tables import numbers, refuse_rows
+from sweep.evaluation.tables import Table, numbers, refuse_rows
 from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of, warn_outside
 from sweep.families.base import Parameter
 from sweep.families.machines import thread_balance
@@ -24,8 +24,6 @@ from sweep.families.machines import thread_balance
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
-
-    from sweep.evaluation.tables import Table
 
 TENSION = Parameter("T1", "none", "tension in front of the contour, gf", not_negative=True)
 ANGLE = Parameter("theta_deg", "none", "wrap angle, degrees", not_negative=True)

@@ -36,7 +36,6 @@ from sweep.families.machines.tools import (
     PLATE_KEYS,
     SEAM_KEYS,
     Tool,
-    bodies,
     read_gap,
     read_height,
     read_tools,
@@ -51,6 +50,9 @@ RELATION_KINDS = (
     "distance", "speed", "timing", "event", "value", "torque", "shaking", "thread", "gap", "take", "enter", "sew",
     "above", "press",
 )  # fmt: skip
+READERS: dict[str, Callable[[str, Mapping[str, Any], Mapping[str, Member], Mapping[str, Tool]], Relation]] = {
+    "gap": read_gap, "take": read_taking, "enter": read_entering, "above": read_height, "thread": read_thread,
+}  # fmt: skip
 DERIVATIVES = 3  # of the angle that drives a member: its jerk needs all of them
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _ENDS_IN_DIGIT = re.compile(r".*\d")
@@ -273,16 +275,9 @@ def _relation(
     name: str, table: dict[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
 ) -> Relation | Timing:
     where = f"machine.relations.{name}"
-    if "gap" in table:
-        return read_gap(name, table, bodies(members, tools), where)
-    if "take" in table:
-        return read_taking(name, table, tools, where)
-    if "enter" in table:
-        return read_entering(name, table, tools, where)
-    if "above" in table:
-        return read_height(name, table, members, tools, where)
-    if "thread" in table:
-        return read_thread(name, table, members, tools)
+    for key, read in READERS.items():
+        if key in table:
+            return read(name, table, members, tools)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
         raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)}", where)
     kind, given = next(iter(table.items()))

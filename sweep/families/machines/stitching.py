@@ -28,8 +28,11 @@ THREAD_KEYS = (
 )  # fmt: skip
 
 
-def read_taking(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Taking:
+def read_taking(
+    name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
+) -> Taking:
     """Read a relation ``take``: needle, blade, sense and fields of work."""
+    where = f"machine.relations.{name}"
     known_keys(table, ("take", "sense", "fields", "vary"), where)
     needle, blade = (tools[one] for one in two_names(table["take"], list(tools), "tools", where))
     if not isinstance(needle, Needle) or not isinstance(blade, Blade):
@@ -55,8 +58,11 @@ def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, wher
     return RiseWindow(name, tuple(fields), vary)
 
 
-def read_entering(name: str, table: dict[str, Any], tools: Mapping[str, Tool], where: str) -> Entering:
+def read_entering(
+    name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
+) -> Entering:
     """Read a relation ``enter``: the tool that enters, a blade, the seam, the sense and a window."""
+    where = f"machine.relations.{name}"
     known_keys(table, ("enter", "sense", "window"), where)
     if len(table["enter"]) != 3:
         raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)

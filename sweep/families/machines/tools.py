@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
@@ -20,12 +20,6 @@ BLADE_KEYS = ("on", "tip", "back", "eye", "hold", "radius")
 SEAM_KEYS = ("at",)
 PLATE_KEYS = ("at", "normal", "fabric")
 PLACES = ("tip", "back", "eye", "hold")  # of a blade, as a member's tip
-NEEDED = {
-    "needle": ("on", "line", "scarf", "diameter", "eye", "point"),
-    "blade": ("on", "tip", "back"),
-    "seam": ("at",),
-    "plate": ("at", "normal"),
-}
 
 
 @dataclass(frozen=True)
@@ -202,9 +196,10 @@ class Height(Relation):
 
 
 def read_height(
-    name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool], where: str
+    name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]
 ) -> Height:
     """Read a relation ``above``: a needle, a blade or a moving point of a member, and a plate."""
+    where = f"machine.relations.{name}"
     spots = {tool.name: tool.working for tool in tools.values() if isinstance(tool, Needle | Blade)}
     spots |= {point: Spot(point) for m in members.values() for point in (f"{m.name}.{own}" for own in m.moving)}
     plates = {tool.name: tool for tool in tools.values() if isinstance(tool, Plate)}
@@ -227,21 +222,20 @@ def read_tools(given: Mapping[str, Mapping[str, Any]], members: dict[str, Member
     for name, table in given.items():
         where = f"machine.tools.{name}"
         kind = "blade" if "back" in table else "plate" if "normal" in table else "seam" if "at" in table else "needle"
-        keys = {"blade": BLADE_KEYS, "seam": SEAM_KEYS, "plate": PLATE_KEYS, "needle": NEEDLE_KEYS}[kind]
+        keys, needed, read = KINDS[kind]
         known_keys(table, keys, where, f"for a {kind}, ")
-        for key in NEEDED[kind]:
+        for key in needed:
             if key not in table:
-                raise MissingInput(key, f"what a {kind} needs: {', '.join(NEEDED[kind])}", where)
-        if kind == "seam":
-            found[name] = Seam(name, vector(table["at"], f"{where}.at"))
-        elif kind == "plate":
-            found[name] = _plate(name, table, where)
-        else:
-            found[name] = (_blade if kind == "blade" else _needle)(name, table, members, where)
+                raise MissingInput(key, f"what a {kind} needs: {', '.join(needed)}", where)
+        found[name] = read(name, table, members, where)
     return found
 
 
-def _plate(name: str, table: Mapping[str, Any], where: str) -> Plate:
+def _seam(name: str, table: Mapping[str, Any], members: Mapping[str, Member], where: str) -> Tool:
+    return Seam(name, vector(table["at"], f"{where}.at"))
+
+
+def _plate(name: str, table: Mapping[str, Any], members: Mapping[str, Member], where: str) -> Tool:
     x, y, z = vector(table["normal"], f"{where}.normal")
     size = math.hypot(x, y, z)
     if size == 0.0:
@@ -286,6 +280,15 @@ def _blade(name: str, table: Mapping[str, Any], members: dict[str, Member], wher
     return Blade(name, tip, back, radius, eye, hold)
 
 
+# Keys of each kind of tool, those that it needs, and its reader.
+KINDS: dict[str, tuple[tuple[str, ...], tuple[str, ...], Callable[..., Tool]]] = {
+    "needle": (NEEDLE_KEYS, ("on", "line", "scarf", "diameter", "eye", "point"), _needle),
+    "blade": (BLADE_KEYS, ("on", "tip", "back"), _blade),
+    "seam": (SEAM_KEYS, ("at",), _seam),
+    "plate": (PLATE_KEYS, ("at", "normal"), _plate),
+}
+
+
 def length(key: str, value: object, where: str, what: str = "a length") -> float:
     """Read a length, or another quantity named by ``what``; refuse a value that is no number or negative."""
     found = number(key, value, where)
@@ -303,8 +306,9 @@ def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str
     return found
 
 
-def read_gap(name: str, table: dict[str, Any], known: Mapping[str, Body], where: str) -> Gap:
+def read_gap(name: str, table: Mapping[str, Any], members: Mapping[str, Member], tools: Mapping[str, Tool]) -> Gap:
     """Read a gap between two bodies, with radii of its own if they are given."""
+    where, known = f"machine.relations.{name}", bodies(members, tools)
     known_keys(table, ("gap", "radii"), where)
     first, second = (known[one] for one in two_names(table["gap"], list(known), "bodies", where))
     if "radii" in table:

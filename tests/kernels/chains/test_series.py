@@ -145,7 +145,7 @@ def test_places_of_extrema_are_those_of_the_search_on_poses(name, request_):
     of, designs = CASES[name]
     found, _ = extrema.true_extrema(of, designs, [request_], 1e-8)
     slow, _ = extrema._searched(of, designs, [request_], 1e-8, False, False, None)
-    left = fused.curve_of(of, request_, False).extremum(designs, 1e-8)[2]
+    left = fused.extrema((fused.curve_of(of, request_, False),), designs, 1e-8)[0][2]
     # What turns back within the swing of the stage before is equally high twice: rounding says where, on poses.
     assert left.mean() < (0.3 if request_.pose in ("s", "dev") else 0.02)
     both = np.stack([found[request_].phi, slow[request_].phi], axis=1)
@@ -166,7 +166,7 @@ def on_the_tie(curve, design):
     def at(turned):
         row = design.copy()
         row[18] += turned
-        found, status, undecided = curve.extremum(row[None], 1e-8)
+        found, status, undecided = fused.extrema((curve,), row[None], 1e-8)[0]
         return row, found.phi[0] if status[0] == st.OK and not undecided[0] else np.nan
 
     def apart(a, b):
@@ -188,8 +188,8 @@ def test_which_of_two_equal_peaks_is_higher_is_left_to_the_search_on_poses_where
     of, designs = CASES["rssr+guide"]
     plain, placed = (fused.curve_of(of, Request("d2s", 0, place=place), False) for place in (False, True))
     tied = next(row for design in designs if (row := on_the_tie(plain, design)) is not None)[None]
-    assert not plain.extremum(tied, 1e-8)[2][0]
-    assert placed.extremum(tied, 1e-8)[2][0]
+    assert not fused.extrema((plain,), tied, 1e-8)[0][2][0]
+    assert fused.extrema((placed,), tied, 1e-8)[0][2][0]
     found, status = extrema.true_extrema(of, tied, [placed.request], 1e-8)
     assert status[0] == st.OK and np.isfinite(found[placed.request].phi[0])
 
@@ -251,19 +251,19 @@ def test_a_first_stage_that_does_not_turn_and_bad_couplings_give_no_value():
     of, designs = CASES["rssr+guide"]
     bad = designs[:4].copy()
     bad[0, 0] *= 50.0  # a crank longer than all other links together
-    found, status, undecided = fused.curve_of(of, Request("d2s", 0), False).extremum(bad, 1e-8)
+    found, status, undecided = fused.extrema((fused.curve_of(of, Request("d2s", 0), False),), bad, 1e-8)[0]
     assert status[0] == st.NOT_ROTATABLE and not undecided[0] and np.isnan(found.value[0])
     bad = designs[:4].copy()
     bad[0, 17], bad[1, 18], bad[2, 12] = 0.5, 1e6, np.nan  # kappa, offset [rad], xi
-    found, status, undecided = fused.curve_of(of, Request("d2s", 0), False).extremum(bad, 1e-8)
+    found, status, undecided = fused.extrema((fused.curve_of(of, Request("d2s", 0), False),), bad, 1e-8)[0]
     assert undecided[:3].all() and np.isnan(found.value[:3]).all() and np.isfinite(found.value[3])
 
 
 def test_no_bit_depends_on_the_designs_beside_it():
     of, designs = CASES["rssr+guide"]
-    together = fused.curve_of(of, Request("d2s", 0), False).extremum(designs, 1e-8)[0]
+    together = fused.extrema((fused.curve_of(of, Request("d2s", 0), False),), designs, 1e-8)[0][0]
     for i in (0, 17, 63):
-        alone = fused.curve_of(of, Request("d2s", 0), False).extremum(designs[[i]], 1e-8)[0]
+        alone = fused.extrema((fused.curve_of(of, Request("d2s", 0), False),), designs[[i]], 1e-8)[0][0]
         assert alone.value[0] == together.value[i] and alone.err[0] == together.err[i]
 
 

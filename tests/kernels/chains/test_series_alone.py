@@ -80,9 +80,9 @@ def test_statuses_are_those_of_the_search_on_poses():
 
 def test_no_bit_depends_on_the_designs_beside_it():
     designs, _ = turning(64, 13)
-    together = fused.curve_of(GUIDE, Request("d2s", 0), False).extremum(designs, 1e-8)[0]
+    together = fused.extrema((fused.curve_of(GUIDE, Request("d2s", 0), False),), designs, 1e-8)[0][0]
     for i in (0, 17, 63):
-        alone = fused.curve_of(GUIDE, Request("d2s", 0), False).extremum(designs[[i]], 1e-8)[0]
+        alone = fused.extrema((fused.curve_of(GUIDE, Request("d2s", 0), False),), designs[[i]], 1e-8)[0][0]
         assert alone.value[0] == together.value[i] and alone.err[0] == together.err[i]
 
 

@@ -261,7 +261,9 @@ def test_scaling_the_slider_by_a_power_of_two_scales_what_is_found():
     request = Request("d2s", 0)
     scaled = designs.copy()
     scaled[:, 8:12] *= 2.0**40
-    found, large = (fused.curve_of(DRIVEN_SLIDER, request, False).extremum(d, 1e-8)[0] for d in (designs, scaled))
+    found, large = (
+        fused.extrema((fused.curve_of(DRIVEN_SLIDER, request, False),), d, 1e-8)[0][0] for d in (designs, scaled)
+    )
     np.testing.assert_array_equal(np.ldexp(found.value, 40), large.value)
 
 
