@@ -19,7 +19,8 @@ from sweep.cli.families import main_outputs
 from sweep.engine.run import KernelStep, run
 from sweep.evaluation.summaries import design_outputs, routes
 from sweep.families import family as find_family
-from sweep.families.base import DEFAULT_TARGET, Accuracy, Angles, Family, March, equal_steps
+from sweep.families.base import DEFAULT_TARGET, Accuracy, Angles, Family, March
+from sweep.families.poses import equal_steps
 from sweep.jobs.executors import executor, for_tasks
 from sweep.jobs.progress import Progress
 from sweep.jobs.signals import Stop, stop_on_signal

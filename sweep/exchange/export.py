@@ -24,8 +24,9 @@ from sweep.exchange.mjcf import METRES, write_mjcf
 from sweep.exchange.scene import finite, pose, shown_name, turn
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Family, Interval, Turn, equal_steps
+from sweep.families.base import Family, Interval, Turn
 from sweep.families.machines.machine import Machine
+from sweep.families.poses import equal_steps
 from sweep.quantities.units import speed_given
 
 

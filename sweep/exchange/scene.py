@@ -15,7 +15,8 @@ from sweep.evaluation.statuses import meaning
 from sweep.evaluation.tables import Table, design_matrix
 from sweep.families import Mechanism
 from sweep.families import family as find_family
-from sweep.families.base import Array, Interval, March, equal_steps
+from sweep.families.base import Array, Interval, March
+from sweep.families.poses import equal_steps
 
 STEPS = 720  # steps of a march from which one pose is taken
 GAP = 0.25  # gap between two frames side by side, relative to the larger one

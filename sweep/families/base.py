@@ -11,7 +11,6 @@ from typing import Any, ClassVar, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from kernels.types import TWO_PI
 from kernels.types import Array as Array
 from sweep.families.parameter import PER_RADIAN as PER_RADIAN
 from sweep.families.parameter import Output as Output
@@ -60,14 +59,6 @@ class March:
 
 
 Domain: TypeAlias = Turn | Interval | March
-
-
-def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
-    """Equal steps of the variable for the first design: one turn from 0, or a whole interval."""
-    if isinstance(domain, Interval):
-        first, last = domain.ends(designs)
-        return np.linspace(float(first[0]), float(last[0]), poses, dtype=np.float64)
-    return np.arange(poses, dtype=np.float64) * (TWO_PI / poses)
 
 
 Columns: TypeAlias = dict[str, NDArray[np.generic]]

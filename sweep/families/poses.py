@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from kernels.status import INVALID_INPUT, OK
-from kernels.types import Array, Status
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, PoseFunction, Step
+from kernels.types import TWO_PI, Array, Status
+from sweep.families.base import Accuracy, Angles, Columns, Domain, Family, Interval, Output, PoseFunction, Step
 from sweep.families.capabilities import DesignMap
 
 
@@ -283,3 +283,11 @@ def blocks(shape: tuple[int, ...], size: int) -> Iterator[tuple[slice, slice]]:
     for i in range(0, shape[0], rows):
         for j in range(0, shape[1], poses):
             yield slice(i, i + rows), slice(j, j + poses)
+
+
+def equal_steps(domain: Domain, designs: Array, poses: int) -> Array:
+    """Equal steps of the variable for the first design: one turn from 0, or a whole interval."""
+    if isinstance(domain, Interval):
+        first, last = domain.ends(designs)
+        return np.linspace(float(first[0]), float(last[0]), poses, dtype=np.float64)
+    return np.arange(poses, dtype=np.float64) * (TWO_PI / poses)

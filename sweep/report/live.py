@@ -21,8 +21,9 @@ from sweep.errors import InputError
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import PlacedPart, extent, is_spatial, shown_name, side_by_side
-from sweep.families.base import Angles, Array, Family, Interval, equal_steps
+from sweep.families.base import Angles, Array, Family, Interval
 from sweep.families.names import is_flag, is_largest, reduced, stem
+from sweep.families.poses import equal_steps
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset
 from sweep.report.optima import DistinctOptimum, Shown, shown_designs
