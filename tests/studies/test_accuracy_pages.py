@@ -28,13 +28,13 @@ def test_stored_tables_give_the_same_pages_and_figures_again(found, tmp_path):
     again = Measured.read(tmp_path)
     assert pages.pages(again) == pages.pages(found)
     first, second = (draw_prices(one, tmp_path / str(k)) for k, one in enumerate((found, again)))
-    assert [figure.uri for figure in first] == [figure.uri for figure in second]
+    assert [figure.read_bytes() for figure in first] == [figure.read_bytes() for figure in second]
 
 
 @pytest.mark.slow
 def test_pages_lead_to_each_other_and_to_their_figures(found, tmp_path):
     written = pages.pages(found)
-    figures = {figure.path.name for figure in draw_prices(found, tmp_path)}
+    figures = {figure.name for figure in draw_prices(found, tmp_path)}
     assert {f"accuracy{part}.svg" for part in ("", "-families", "-effects")} == figures
     for path in list(written)[1:]:
         assert f"]({path})" in written["accuracy.md"]
