@@ -110,9 +110,7 @@ def speed_fluctuation(
                 coefficients(work, turn, all_wc, all_ws)
                 e, all_wc[0] = all_wc[0], 0.0
                 # A steep line bends the energy more than the loads do: its slope must be resolved, too.
-                for k in range(half):
-                    all_xc[k], all_xs[k] = k * all_ws[k], -k * all_wc[k]
-                left = max(left, tail(all_xc, all_xs, energy_scale))
+                left = max(left, _slope_tail(all_wc, all_ws, all_xc, all_xs, energy_scale))
                 code = st.NOT_CONVERGED if left > coarsest else st.OK
                 count = significant(all_wc, all_ws)
                 wc, ws = all_wc[:count], all_ws[:count]
@@ -143,6 +141,14 @@ def _integrate(c: Array, s: Array) -> None:
     """Integrate a Fourier series without a mean over the crank angle, in place."""
     for k in range(1, c.size):
         c[k], s[k] = -s[k] / k, c[k] / k
+
+
+@inline
+def _slope_tail(c: Array, s: Array, slope_c: Array, slope_s: Array, scale: float) -> float:
+    """Share of the scale that the highest harmonics of the series' slope have; its coefficients go to ``slope_...``."""
+    for k in range(c.shape[0]):
+        slope_c[k], slope_s[k] = k * s[k], -k * c[k]
+    return tail(slope_c, slope_s, scale)
 
 
 @inline

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -89,6 +90,11 @@ class Faults:
         except units.UnitFault as fault:
             self.value(key, unit, str(fault))
             return None
+
+    def within_turn(self, key: Key, written: float, unit: str | None) -> None:
+        """Report a number in rad that is beyond one turn: it was meant in degrees."""
+        if unit == "rad" and abs(written) > 2.0 * math.pi:
+            self.value(key, written, f'an angle within one turn if the unit is rad; {written:g} with the unit "deg"?')
 
     def _add(self, key: Key, text: str) -> None:
         file = self._file_of(key)

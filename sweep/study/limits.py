@@ -135,6 +135,8 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
     factor = faults.factor(entry.unit or "1", internal, (*key, "unit"))
     if factor is None:
         return []
+    for end in ("min", "max"):
+        faults.within_turn((*key, end), getattr(entry, end) or 0.0, entry.unit)
     bounds = [None if bound is None else bound * factor for bound in (entry.min, entry.max)]
     return [Limit(output.name, *bounds)]
 
@@ -159,6 +161,7 @@ def _read_text(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
     except ValueError:
         faults.value(key, text, form)
         return []
+    faults.within_turn(key, max(abs(centre), abs(number)), unit)
     if not (math.isfinite(centre) and math.isfinite(number * factor) and (number > 0.0 or not band)):
         allowed = (
             f"a finite value and a positive band, as {_band(internal)}"

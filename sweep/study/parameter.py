@@ -144,8 +144,7 @@ def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faul
 
 
 def _checked(p: Parameter, written: float, unit: str | None, value: float, key: Key, faults: Faults) -> float:
-    if unit == "rad" and abs(written) > 2.0 * math.pi:
-        faults.value(key, written, f'an angle within one turn if the unit is rad; {written:g} with the unit "deg"?')
+    faults.within_turn(key, written, unit)
     if p.sign and (math.isnan(value) or p.wrong_sign(value)):
         faults.value(key, written, f"a {p.sign} {p.unit} ({p.text})")
     if p.choices is not None and value not in p.choices:

@@ -27,11 +27,10 @@ from sweep.cli import main
 from sweep.dataset import chunk_files, files
 from sweep.dataset.chunk_files import content_hash
 from sweep.dataset.lock import locked
-from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError, WorkerDied
+from sweep.errors import InputError, LinksweepError, LinksweepWarning, LockedError, StoreError
 from sweep.report.dataset import gather
 from sweep.report.page import write_report
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
-from tests.support.selection import mostly_long
 
 
 @pytest.fixture(autouse=True)
@@ -247,43 +246,6 @@ def test_a_link_in_place_of_the_folder_that_leads_nowhere_is_said(whole: tuple[P
         sweep.run(whole[0], dataset)
 
 
-FULL_MEMORY = [
-    MemoryError(),
-    ImportError("libarrow.so: failed to map segment from shared object"),
-    RuntimeError("can't start new thread"),
-    OSError("Zstd compression failed: Allocation error : not enough memory"),
-]
-
-
-@pytest.mark.parametrize("error", FULL_MEMORY)
-def test_full_memory_is_no_error_in_the_program(
-    whole: tuple[Path, Path], tmp_path: Path, error: Exception, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*given: object) -> None:
-        raise error
-
-    monkeypatch.setattr(sweep.engine.worker, "compute_chunk", full)
-    with pytest.raises(WorkerDied, match="the memory it may use is full, in chunk 0; fewer jobs need less"):
-        sweep.run(whole[0], tmp_path / "designs", jobs=1)
-
-
-@pytest.mark.parametrize("error", FULL_MEMORY)
-def test_full_memory_of_the_program_itself_is_said(
-    whole: tuple[Path, Path], tmp_path: Path, error: Exception, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A run with 780 MB ended with a traceback where its progress began a thread."""
-
-    def full(*given: object) -> None:
-        raise error
-
-    said: list[str] = []  # by the last words, which also give up the standard output for good
-    monkeypatch.setattr(sys.modules["sweep.cli.main"], "_last_words", said.append)
-    monkeypatch.setattr("sweep.dataset.store.finished_chunks", full)
-    done = CliRunner().invoke(main, ["run", str(whole[0]), "--out", str(tmp_path / "designs")])
-    assert done.exit_code == 70 and isinstance(done.exception, SystemExit), done.exception
-    assert said == ["sweep: the memory it may use is full; fewer jobs need less"]
-
-
 def test_the_parent_folder_may_be_exported(dataset: Path) -> None:
     (dataset.parent / "tolerance.parquet").write_bytes(b"")
     done = CliRunner().invoke(main, ["export", str(dataset.parent), "--format", "csv"])
@@ -347,15 +309,3 @@ def test_a_folder_closed_to_the_user_is_said(whole: tuple[Path, Path], dataset: 
     finally:
         dataset.chmod(0o755)
     assert done.returncode == 2 and "Traceback" not in done.stderr and "not readable" in done.stderr
-
-
-@pytest.mark.parametrize("bytes_allowed", mostly_long([8 * 10**8, 12 * 10**8, 16 * 10**8], [12 * 10**8]))
-def test_little_memory_ends_with_70_or_suffices(whole: tuple[Path, Path], tmp_path: Path, bytes_allowed: int) -> None:
-    limited = f"import resource, sys; resource.setrlimit(resource.RLIMIT_AS, ({bytes_allowed}, {bytes_allowed})); "
-    program = f"{limited}sys.argv = ['sweep', *sys.argv[1:]]; from sweep.__main__ import main; main()"
-    done = subprocess.run(
-        [sys.executable, "-c", program, "run", str(whole[0]), "--out", str(tmp_path / "designs")],
-        capture_output=True, text=True, cwd=ROOT, timeout=240, check=False,
-    )  # fmt: skip
-    assert "Traceback" not in done.stderr
-    assert done.returncode == 0 or (done.returncode == 70 and "the memory it may use is full" in done.stderr)

@@ -90,6 +90,10 @@ m_coupler = "20 g"
         ('"40 deg"', '{ value = -40, unit = "rad" }', "design.alpha = -40.0; allowed: an angle within one turn"),
         ('"40 deg"', '{ values = [1, 7], unit = "rad" }', "design.alpha.values[1] = 7.0; allowed: an angle within"),
         ('"40 deg"', '{ from = 0, to = 90, count = 2, unit = "rad" }', "design.alpha.to = 90.0; allowed: an angle"),
+        ("[bodies]", '[limits]\nmax_pressure_angle = "<= 45 rad"\n[bodies]',
+         "limits.max_pressure_angle = 45.0; allowed: an angle within one turn if the unit is rad; 45 with"),
+        ("[bodies]", '[limits]\nmax_pressure_angle = { max = 45, unit = "rad" }\n[bodies]',
+         "limits.max_pressure_angle.max = 45.0; allowed: an angle within one turn if the unit is rad; 45 with"),
         # Both what was written and what is still missing are named.
         ("m_coupler", "m_arm", "m_arm: unknown input of the effects of rssr; allowed: m_coupler, m_crank, m_rocker"),
         ("m_coupler", "m_arm", 'm_coupler is missing; needed: mass of the coupler; for kinetostatics: a mass with its'
