@@ -14,10 +14,19 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.curves.periodic import coefficients, on_grid, series, series_at, significant, tail
+from kernels.curves.periodic import (
+    LEVEL,
+    coefficients,
+    height_bound,
+    on_grid,
+    series,
+    series_at,
+    significant,
+    tail,
+)
 from kernels.curves.root_search import bisected
 from kernels.effects.motor_line import steady_energy
-from kernels.jit import inline, kernel
+from kernels.jit import inline, kernel, part
 from kernels.types import Array, Status
 
 NEWTON = 60
@@ -223,13 +232,34 @@ def _rises(phi: float, jc: Array, js: Array, wc: Array, ws: Array, e: float, sig
 
 
 @inline
-def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, inertia: Array, work: Array) -> float:
-    """Find the largest (sign +1) or smallest (-1) speed: the best sample first, then its slope's zero by bisection."""
-    best, where, step = -math.inf, 0.0, 2.0 * math.pi / work.size
-    for j in range(work.size):
-        value = sign * (e + work[j]) / inertia[j]
-        if value > best:
-            best, where = value, step * j
-    low, high = bisected(_rises, where - step, where + step, jc, js, wc, ws, e, sign)
+def _sample(j: int, e: float, sign: float, inertia: Array, work: Array) -> float:
+    """Sign times half the square of the speed at a sample."""
+    value: float = sign * (e + work[j]) / inertia[j]
+    return value
+
+
+@part
+def _top(j: int, samples: int, jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float) -> float:
+    """Sign times half the square of the speed at the top next to a sample: its slope's zero by bisection."""
+    step = 2.0 * math.pi / samples
+    low, high = bisected(_rises, step * (j - 1), step * (j + 1), jc, js, wc, ws, e, sign)
     middle = 0.5 * (low + high)
-    return math.sqrt(2.0 * (e + series(wc, ws, middle)[0]) / series(jc, js, middle)[0])
+    return sign * (e + series(wc, ws, middle)[0]) / series(jc, js, middle)[0]
+
+
+@inline
+def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, inertia: Array, work: Array) -> float:
+    """Find the largest (sign +1) or smallest (-1) speed: the top at the best sample, or one that exceeds it."""
+    n, best, highest = work.size, 0, -math.inf
+    for j in range(n):
+        here = _sample(j, e, sign, inertia, work)
+        best, highest = (j, here) if here > highest else (best, highest)
+    highest = _top(best, n, jc, js, wc, ws, e, sign)
+    for j in range(n):
+        before, here = _sample(j - 1, e, sign, inertia, work), _sample(j, e, sign, inertia, work)
+        after = _sample((j + 1) % n, e, sign, inertia, work)
+        # an even speed has rounding tops alone
+        least = highest + LEVEL * abs(highest)
+        if j != best and here >= before and here >= after and height_bound(before, here, after) > least:
+            highest = max(highest, _top(j, n, jc, js, wc, ws, e, sign))
+    return math.sqrt(2.0 * abs(highest))
