@@ -255,11 +255,12 @@ def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     height, rising = path[:, 0], path[:, 0] > 0.0
     with np.errstate(all="ignore"):
         springs = np.where(rising, (-unit[:, None] * path[:, 2] - preload[:, None]) / height, -np.inf)
-        # the top of a parabola through the highest node and its neighbours; nan next to the plate
-        nodes = springs.argmax(axis=1)[:, None] + [[-1, 0, 1]]
-        before, most, after = np.take_along_axis(springs, nodes % NODES, axis=1).T
-        top = most - (after - before) ** 2 / (8.0 * (before - 2.0 * most + after))
-    softest = np.where(known & (preload >= least), np.fmax(np.fmax(most, top), 0.0), np.nan)
+        # at every node the top of the parabola through it and its neighbours; nan next to the plate
+        before, after = np.roll(springs, 1, axis=1), np.roll(springs, -1, axis=1)
+        tops = springs - (after - before) ** 2 / (8.0 * (before - 2.0 * springs + after))
+        # of nearly equal tops the higher one may lie between lower nodes
+        tops = np.where((springs >= before) & (springs >= after), np.fmax(springs, tops), -np.inf)
+    softest = np.where(known & (preload >= least), np.maximum(tops.max(axis=1), 0.0), np.nan)
     return happening({"k_min_contact": softest, "F0_min_contact": least, "status": status}, wanted)
 
 

@@ -261,6 +261,27 @@ def test_foot_on_a_feed_rack_keeps_contact_from_the_softest_spring_and_the_least
     assert plenty.k_min_contact == 0.0 and plenty.status == st.OK
 
 
+def test_softest_spring_of_two_nearly_equal_tops_is_that_of_the_higher_one():
+    """The higher top lies in the middle between two nodes, both lower than the node beside the other top."""
+    names = ("h_a", "h_b", "h_c", "h_e", "rh", "dh", "xE", "yE", "rE", "dE", "q", "fx", "fy", "tx", "ty")
+    values = (0.375, 3.395, 1.597, 4.171, 1.197, -0.264, 4.82, 0.619, 0.177, 0.687, 1.868, -1.393, 0.628, -0.259, 0.809)
+    shift = 0.125 * 2.0 * math.pi / 720
+    rack = dict(zip(names, values, strict=True)) | {"h_sigma": -1.0, "bar_branch": -1.0, "y_plate": 1.3266229}
+    rack |= {"dh": rack["dh"] + shift, "dE": rack["dE"] + shift}
+    m, omega = 0.038, 24.07
+    p = rack | {"m": m, "k": 0.0, "F0": 0.8, "omega": omega}
+    p["F0"] = 1.01 * sweep.summarise("feed_foot", p, ["F0_min_contact"]).F0_min_contact[0]
+    tops = []
+    for place in (1.137, 2.152):
+        poses = sweep.evaluate("feed", rack, ["y_t", "d2y_t"], phi=np.linspace(place - 0.02, place + 0.02, 8001))
+        spring = (-m * omega**2 * poses.d2y_t - p["F0"]) / (poses.y_t - rack["y_plate"])
+        assert 0 < spring.argmax() < 8000
+        tops.append(spring.max())
+    assert 5e-6 < tops[1] / tops[0] - 1.0 < 1.5e-5
+    # a parabola through three nodes misses the higher top by 2.1e-6; the lower one would be 1e-5 too low
+    assert abs(sweep.summarise("feed_foot", p, ["k_min_contact"]).k_min_contact[0] / tops[1] - 1.0) < 3e-6
+
+
 def test_loads_are_the_momentum_of_the_foot_and_the_work_of_its_rack() -> None:
     """Contact all the way: the force on the frame is that of the path, and the rack gets its work back."""
     design = {"m": 0.05, "k": 3000.0, "F0": 60.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
