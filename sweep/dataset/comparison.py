@@ -258,11 +258,19 @@ def _in_words(status: Any) -> str:
     return f"{status} ({meaning(status)})"
 
 
+def _mechanism(plan: Mapping[str, Any]) -> str:
+    """Name the mechanism of a dataset: its family, its chain, or the members of its machine."""
+    data = plan.get("data") or plan.get("chunk_data") or {}
+    members = data.get("machine") or {"": data.get("mechanism") or {}}
+    stages = {name: "+".join(of.get("chain") or [of.get("family", "")]) for name, of in members.items()}
+    return ", ".join(f"{name}={chain}" if name else chain for name, chain in sorted(stages.items()))
+
+
 def _other_designs(result: Comparison, plans: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     """Say of two studies whose rows of one number are different designs what that means for the changes."""
     parameters = {c["name"] for plan in plans for c in plan.get("columns", ()) if c["role"] == "parameter"}
     other = [name for name, moved in result.moved.items() if name in parameters and moved.changed]
-    if not other or plans[0].get("study") == plans[1].get("study"):
+    if not other or plans[0].get("study") == plans[1].get("study") or len({_mechanism(plan) for plan in plans}) > 1:
         return ()
     words = "rows are compared by their numbers, and with these the two studies number different designs"
     return (f"the designs differ in {', '.join(other)}: {words}, so changed values do not concern one mechanism",)
@@ -274,7 +282,12 @@ def _notes(folders: Sequence[Path], plans: Sequence[Mapping[str, Any]]) -> tuple
         for folder, plan in zip(folders, plans, strict=True)
         if not plan.get("complete") or chunk_files.missing_chunks(folder, chunk_files.parts(folder))
     ]
-    if plans[0].get("study") != plans[1].get("study"):
+    mechanisms = [_mechanism(plan) for plan in plans]
+    if all(mechanisms) and mechanisms[0] != mechanisms[1]:
+        notes.insert(
+            0, f"two studies of different mechanisms, {mechanisms[0]} and {mechanisms[1]}: no row is comparable"
+        )
+    elif plans[0].get("study") != plans[1].get("study"):
         notes.append("the studies differ in what determines the values")
     if plans[0].get("code") != plans[1].get("code"):
         notes.append("computed by different versions of the code or its libraries")

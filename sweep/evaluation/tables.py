@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
@@ -239,8 +240,10 @@ def numbers(values: object, name: str, place: str) -> Array:
     Raises
     ------
     InputError
-        for the first value that is not a number, with its place
+        for the first value that is not a number, with its place; for a set, which has no order, and for an iterator
     """
+    if isinstance(values, AbstractSet | Iterator):
+        raise InputError(name, values, "a number, or a list or array of numbers", place.partition(",")[0])
     array = _converted(values)
     if array is not None:
         return array

@@ -312,8 +312,12 @@ def marked(data: Dataset) -> dict[str, Any]:
 
 
 def gather(folder: Path) -> tuple[Dataset, Scan, list[Cells]]:
-    """Read a dataset and all its rows once, and compute a reference that no optimiser has stored."""
-    data = read_dataset(folder)
+    """Read a dataset and all its rows."""
+    return read_rows(read_dataset(folder))
+
+
+def read_rows(data: Dataset) -> tuple[Dataset, Scan, list[Cells]]:
+    """Read all rows of a dataset once, and compute a reference that no optimiser has stored."""
     feasible = data.counts.get(codes.OK, 0)
     cells = divided_axes(data.study, feasible)
     objective = None if data.objective is None else data.objective.name

@@ -17,7 +17,7 @@ from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.manufacture.tolerance import COST_SAMPLE, TELLING_GAIN
 from sweep.pages import rendered
 from sweep.report import answer, maps, tables
-from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, gather, read_dataset, row_of
+from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, read_dataset, read_rows, row_of
 from sweep.report.figures import data_uri, house_style, save
 from sweep.report.front import Front
 from sweep.report.live import embedded, live, moving, scripts_of
@@ -75,8 +75,9 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
 
 def _write(folder: Path, out: Path, say: Say) -> Path:
     """Write all files of the report into ``out``."""
+    data = read_dataset(folder)  # a folder without a dataset is refused before any progress is shown
     say("report", 0, STEPS, "steps")
-    data, scanned, cells = gather(folder)
+    data, scanned, cells = read_rows(data)
     several = groups(data)
     with unwritable(f"report {out}"):
         out.mkdir(parents=True, exist_ok=True)

@@ -34,6 +34,15 @@ FORMS = (
     '{ file = "load.csv", unit = "N" }',
     '{ mean = 1.0, cos = [0.5], sin = [0.2], unit = "N" }',
 )
+# How inputs of effects begin, by the word of a textbook.
+SYMBOLS = {
+    "moment_of_inertia": "j",
+    "inertia": "j",
+    "mass": "m",
+    "friction": "mu",
+    "centre_of_mass": "com",
+    "cog": "com",
+}
 ROD = '{ material = "steel", section = "6 mm round", inertia = "exact" }'
 Numbers = Annotated[list[Number], Field(max_length=MOST_POINTS)]
 
@@ -154,8 +163,11 @@ def _misplaced(bare: Family, key: Key, entry: object, owners: dict[str, str], fa
     else:
         # The inputs of a chain are hundreds: those that begin alike, such as the masses, are meant first.
         known = sorted(name for name, owner in owners.items() if owner == table)
-        alike = [other for other in known if other.partition("_")[0] == name.partition("_")[0]]
-        guess = closest(name, alike) or closest(name, known)
+        word = next((word for word in SYMBOLS if name.startswith(f"{word}_")), None)
+        meant = SYMBOLS[word] + name.removeprefix(word) if word else name
+        alike = [other for other in known if other.startswith(meant.rstrip("0123456789"))] if word else []
+        alike = alike or [other for other in known if other.partition("_")[0] == name.partition("_")[0]]
+        guess = closest(name, alike) or (None if word and alike else closest(name, known))
         names = alike if guess is None or guess in alike else [*alike, guess]
         faults.unknown(key, names or known, f"input of the effects of {bare.name}")
 

@@ -108,6 +108,8 @@ def test_status_in_words() -> None:
         ([[0.0], [1.0]], "phi = 'shape (2, 1)'"),
         ([[0.0], [1.0, 2.0]], "phi, position 0: phi = [0.0]; allowed: a number"),
         (np.array([0.0, [1.0]], dtype=object), "phi, position 1: phi = [1.0]; allowed: a number"),
+        ({0.1}, "phi: phi = {0.1}; allowed: a number, or a list or array of numbers"),
+        (iter([0.1, 0.2]), "iterator object at"),
     ],
 )
 def test_crank_angles_that_are_no_plain_list_are_refused(phi: Any, words: str) -> None:
@@ -150,7 +152,7 @@ def objects(*values: Any) -> Any:
         ),
         (objects(1.0, Unprintable()), "a = something of type Unprintable that cannot be printed; allowed: a number"),
         ([1.0, "x" * 5000], " ...; allowed: a number"),
-        ({1.0, 2.0}, "a = 1.0; allowed: a number"),
+        ({1.0, 2.0}, "column a: a = {1.0, 2.0}; allowed: a number, or a list or array of numbers"),
     ],
 )
 @pytest.mark.parametrize("function", [sweep.summarise, sweep.evaluate])

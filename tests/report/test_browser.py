@@ -189,6 +189,20 @@ def test_first_tables_fit_a_telephone(address, browser):
             assert page.locator(f"#{name} .table").first.evaluate("(t) => t.scrollWidth - t.clientWidth") == 0
 
 
+def test_what_is_moved_sideways_on_a_telephone_says_so(address, browser):
+    hint = (
+        "[...document.querySelectorAll('.scroll > img')].map((x) => getComputedStyle(x.closest('figure')"
+        ".querySelector('figcaption'), '::before').content.includes('ideways') == x.parentElement.scrollWidth > "
+        "x.parentElement.clientWidth)"
+    )
+    shade = "getComputedStyle(document.querySelector('.table')).backgroundImage"
+    for width, shaded in ((390, True), (1400, False)):
+        with opened(browser, address, width) as page:
+            found = page.evaluate(hint)
+            assert found and all(found)
+            assert ("gradient" in page.evaluate(shade)) == shaded
+
+
 def test_dark_mode_is_dark_and_paper_is_white(address, browser):
     with opened(browser, address, color_scheme="dark") as page:
         assert pixels(page, full_page=True).mean() < 0.2
