@@ -20,6 +20,12 @@ def _leave(number: int, frame: FrameType | None) -> None:
     os._exit(128 + number)
 
 
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:  # the caller may have closed it: sweep ... >&-
+            stream.flush()
+
+
 class Ending:
     """The end of the process, after everything that Python calls at exit.
 
@@ -37,8 +43,7 @@ class Ending:
         if self.code is None:
             return
         try:
-            sys.stdout.flush()
-            sys.stderr.flush()
+            _flush()
         except (OSError, ValueError):  # a full disk, or a stream that is closed
             return
         os._exit(self.code)
@@ -64,8 +69,7 @@ def main() -> None:
                 signal.signal(number, lambda *_: os._exit(code))
             raise
         # An interrupted compiler or pool has nothing to clean up, and may hang when it tries.
-        sys.stdout.flush()
-        sys.stderr.flush()
+        _flush()
         os._exit(code)
 
 

@@ -165,3 +165,14 @@ program.main()
             [sys.executable, "-c", program, *words], cwd=ROOT, capture_output=True, text=True, timeout=60, check=False
         )
         assert done.returncode == code and done.stdout.endswith("python's own\n"), done.stderr
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])
+def test_a_stream_that_the_caller_has_closed_is_no_fault(closed: str) -> None:
+    """There is nothing to flush at the end: with a closed standard output it was told as an AttributeError."""
+    for verb, code in (("families rssr", 0), ("family", 2)):
+        done = subprocess.run(
+            ["sh", "-c", f'"$0" -m sweep {verb} {closed}', sys.executable],
+            cwd=ROOT, capture_output=True, text=True, timeout=60, check=False,
+        )  # fmt: skip
+        assert done.returncode == code and "AttributeError" not in done.stderr, done.stderr
