@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.periodic import turn_extremes
-from kernels.types import Status
+from kernels.types import TWO_PI, Status
 from sweep.effects.scene import Scene, take_over
 from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.poses import chosen
@@ -89,9 +89,11 @@ def reductions(
     status[(status == st.OK) & ~(missed < limit)] = st.NOT_CONVERGED
     size = np.maximum(np.abs(largest), np.abs(least))
     # The curve is as accurate as the steady state that it comes from.
-    err = (missed + known) * size
-    # Of a top and a bottom as far from zero within their errors the first in the turn counts.
-    upward = np.where(np.abs(largest + least) <= 2.0 * err, phi_largest <= phi_least, largest >= -least)
+    err, early = (missed + known) * size, np.sqrt(missed + known)
+    phi_largest, phi_least = np.mod(phi_largest, TWO_PI), np.mod(phi_least, TWO_PI)  # just before 0 rounds to 2 pi
+    # Of a top and a bottom as far from zero within their errors the first in the turn counts, 0 within its error too.
+    first = np.mod(phi_largest + early, TWO_PI) <= np.mod(phi_least + early, TWO_PI)
+    upward = np.where(np.abs(largest + least) <= 2.0 * err, first, largest >= -least)
     found = {
         "max": (largest, err),
         "min": (least, err),

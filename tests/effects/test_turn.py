@@ -13,6 +13,7 @@ from kernels.effects import bearings, permissible
 from kernels.effects.pressure import pressure_extrema
 from studies.accuracy.ordinary import designs as bench_designs
 from sweep.effects import extended
+from sweep.effects.turn import reductions
 from sweep.families import family
 
 DENSE = 4096
@@ -22,6 +23,20 @@ PHI = 2.0 * np.pi * np.arange(DENSE) / DENSE
 def table(names, n=3):
     full = extended(family("rssr"), names)
     return dict(zip(full.parameter_names, bench_designs(full, n).T, strict=True))
+
+
+def test_places_beside_the_angle_zero_are_below_a_turn_and_the_first_of_it():
+    """A top 1e-17 before 0 rounded to 2 pi, and came behind a bottom as deep half a turn later."""
+    phi = 2.0 * np.pi * np.arange(65) / 65
+    before = np.array([0.0, 1e-17, 1e-12, 1e-9])[:, None]
+    status = np.zeros(4, np.uint8)
+    # the known error of the height, 1e-12, leaves the place open by 1e-6
+    found = reductions("x", np.cos(phi + before) + 0.2 * np.cos(3.0 * (phi + before)), status, known=1e-12)
+    assert (status == st.OK).all()
+    for name in ("phi_max_x", "phi_max_abs_x"):
+        assert ((found[name] >= 0.0) & (found[name] < 2.0 * np.pi)).all()
+        off = np.abs(np.mod(found[name] + np.pi, 2.0 * np.pi) - np.pi)
+        assert (off <= found[f"err_{name}"]).all()
 
 
 @pytest.mark.parametrize("output", ["drive_torque", "d2psi", "pressure_angle", "psi", "force_c"])
