@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import sweep
+from sweep.chunks.plan import designs_fingerprint
 from sweep.cli.main import main
 from sweep.study import load_study
 from sweep.study.limits import settings
@@ -129,6 +130,16 @@ def test_windows_and_settings_of_a_study_are_limits(tmp_path):
     assert limits["looper.swing"] == pytest.approx((math.radians(40.0), math.radians(60.0)))
     assert limits["a_clearance"] == tuple(settings()["juki-mo-104d"]["clearance"])
     assert limits["a_back_height"] == (-1.0, 1.0)  # the study's own, not the machine's 0.2
+
+
+def test_an_edited_setting_leaves_no_old_chunk_valid(tmp_path, monkeypatch):
+    """The table is no source that is hashed: its numbers are part of a study's identity as limits."""
+    before = load_study(written(tmp_path, STUDY))
+    edited = {"juki-mo-104d": settings()["juki-mo-104d"] | {"clearance": [0.02, 0.1]}}
+    monkeypatch.setattr("sweep.study.limits.settings", lambda: edited)
+    after = load_study(written(tmp_path, STUDY))
+    assert after.data == before.data
+    assert designs_fingerprint(after) != designs_fingerprint(before)
 
 
 def test_plan_tells_a_limit_of_the_cyclogram_and_another_on_the_same_output(tmp_path):

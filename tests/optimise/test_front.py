@@ -179,6 +179,23 @@ def test_starts_lie_within_their_bound(whole: tuple[Study, Path]) -> None:
     assert len(few) == 3 and merit.max() == within.nsmallest(3).max()
 
 
+def test_starts_of_a_front_of_swings_are_the_smallest_by_magnitude(whole: tuple[Study, Path]) -> None:
+    """The sign of a swing is the branch: by the signed value the largest negative swings came first."""
+    study, folder = whole
+    rows = pd.concat(pd.read_parquet(path) for path in sorted(folder.glob("part-*")))
+    within = Limit("max_pressure_angle", None, 0.8)
+    swings = rows.loc[rows["max_pressure_angle"] <= 0.8, "swing"]
+    assert swings.min() < 0.0 < swings.max()
+    ((designs, merit),) = best_rows(study.family, "swing", folder, [within], 3)
+    assert sorted(merit) == sorted(swings.abs().nsmallest(3))
+    found = rows.set_index(list(study.family.parameter_names))["swing"]
+    np.testing.assert_array_equal(np.abs([found.loc[tuple(row)] for row in designs]), merit)
+    # so is a bound on it
+    middle = float(rows["swing"].abs().median())
+    ((designs, _),) = best_rows(study.family, "max_abs_d2psi", folder, [Limit("swing", None, middle)])
+    assert len(designs) == (rows["swing"].abs() <= middle).sum()
+
+
 def test_report_shows_the_front(whole: tuple[Study, Path], tmp_path: Path) -> None:
     _, folder = whole
     page = write_report(folder, tmp_path / "report").read_text(encoding="utf-8")
