@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from sweep.effects import elsewhere, extended, offered
+from sweep.effects.wanted import names_of_effects
 from sweep.errors import InputError, listed, nearest
 from sweep.families import NAMES
 from sweep.families import family as find_family
@@ -296,6 +297,8 @@ def _known(family: Family, name: str) -> str:
     words = f"{', '.join(f'{prefix}x' for prefix in grammar)} of a pose output x, or one of {special}"
     of_effects = [o.name for o in offered(family)]
     near = nearest(name, [*names, *of_effects, *(f"{prefix}{x}" for x in of_effects for prefix in grammar)])
+    if effects := [effect for effect in names_of_effects(family) if effect.endswith(f"_{name}")]:
+        near = f"; {name} is the effect {min(effects, key=len)} here"
     if name in family.pose_names:
         extremes = ", ".join(f"{prefix}{name}" for prefix in grammar if not prefix.startswith(f"{family.domain.name}_"))
         near = f"; {name} is one of a single pose, ask `evaluate`, or for one of {extremes}"

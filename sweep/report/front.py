@@ -84,16 +84,21 @@ class Front:
         return rows
 
     def sentence(self) -> str:
-        """Return a sentence about the ends of the front; empty with fewer than two points."""
+        """Return a sentence about the ends of the front, and about the bounds within which no design was found."""
         objective, second = self.objective, self.second
-        points = [point for point in self.points if not _missed(point)]
+        points, missed = ([p for p in self.points if _missed(p) == beyond] for beyond in (False, True))
+        beyond = ""
+        if missed:
+            of = f"{len(missed)} of {how_many(len(self.points), 'bound')} on the {second.words}"
+            loosest = f"{self.side} {second.show(float(missed[0]['bound']))}"
+            beyond = f"No design was found within {of}, the loosest of them {loosest}."
         if len(points) < 2:
-            return ""
+            return beyond
         loose, tight = (
             f"{objective.show(float(p[objective.name]))} with {self.side} {second.show(float(p['bound']))}"
             for p in (points[0], points[-1])
         )
-        return f"The {objective.words} against the {second.words}: {loose}, {tight}."
+        return f"The {objective.words} against the {second.words}: {loose}, {tight}. {beyond}".rstrip()
 
     def note(self) -> str:
         """Describe how much of the front was searched."""

@@ -26,6 +26,7 @@ from sweep.optimise.multistart.survey import optima_words
 from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, share_words, survey_warnings
 from sweep.report.dataset import Dataset, read_dataset
+from sweep.report.front import Front
 from sweep.report.tables import bound_words, limit_states, limited
 from sweep.study import Limit, Study
 from sweep.synthesis.fit import fit_line
@@ -74,6 +75,8 @@ def ending(folder: Path) -> Ending:
     else:
         missed = feasible == 0
         lines += _nearest_of_space(data.study, data) if missed else []
+    if (front := Front.of(data)) and (sentence := front.sentence()):
+        lines.append(f"front: {sentence[0].lower()}{sentence[1:].rstrip('.')}")
     if data.front_steps is not None:
         lines.append(f"warning: time ran out: {data.front_steps} steps of the front")
     # No-break spaces keep values with their units on a page; tools of a shell expect plain ones.

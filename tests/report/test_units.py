@@ -53,6 +53,16 @@ def test_what_gives_way_is_said_in_the_unit_of_its_table() -> None:
     assert row.held == f"{angle}; stroke by 0.2\u00a0mm; largest acceleration has no value"
 
 
+def test_bounds_without_a_design_are_said() -> None:
+    """The table had them; neither the answer nor the terminal said a word of a front without any design."""
+    found = Front.of(front_of("at_most", codes.LIMIT_EXCEEDED))
+    angle = "largest pressure angle of stage 1"
+    assert (
+        found.sentence() == f"No design was found within 1 of 1 bound on the {angle}, the loosest of them at most 40°."
+    )
+    assert Front.of(front_of("at_most")).sentence() == ""
+
+
 @pytest.mark.parametrize(("found", "bound", "status", "words"), [
     (7.9, 40.0, codes.OK, "the front has a better design within all limits, 7.9 mm/rad²: run more starts"),
     (8.0, 40.0, codes.OK, ""),

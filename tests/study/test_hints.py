@@ -112,6 +112,13 @@ def test_a_message_leads_to_what_is_meant(before: str, behind: str, said: str, t
     assert said in str(fault.value)
 
 
+def test_the_name_of_an_effect_leads_to_the_one_of_the_family(tmp_path: Path) -> None:
+    text = CRANK_ROCKER.replace('"rssr"', '"rssp"').replace('"kinetostatics"', '"friction"')
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(StudyError, match="; friction is the effect slider_friction here\n"):
+        load_study(tmp_path)
+
+
 def test_a_disk_that_can_only_be_read_is_an_error_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Such a disk refuses to delete the file that it has refused to make, too."""
 
