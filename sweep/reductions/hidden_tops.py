@@ -1,8 +1,9 @@
 """Maxima that even samples hide: a second one closer than a sample, or one next to an angle where a curve switches.
 
 Samples that resolve a curve to a tenth of its size may show two maxima as one.  Then the error of the quartic at the
-maximum exceeds that of a single maximum of this width, and a closer look decides.  Beside an angle at which a curve
-switches, as at the beginning of a cam's phase, a force may fall to zero and rise again within a hundredth of a sample:
+maximum exceeds that of a single maximum of this width, or the samples beside it do not fall as those of a single one
+do, and a closer look decides.  Beside an angle at which a curve switches, as at the beginning of a cam's phase, a force
+may fall to zero and rise again within a hundredth of a sample:
 places that crowd about the angle show a maximum at any distance.
 """
 
@@ -59,7 +60,10 @@ def doubtful(candidates: PeakCandidates, peaks: Peaks, around: Array, tolerance:
     curve = _curve(candidates, 1 + candidates.request.max(initial=0))
     best = np.full(curve.max(initial=0) + 1, -np.inf)
     np.maximum.at(best, curve, peaks.height)
-    return np.flatnonzero((off > np.maximum(tolerance, NARROW * fall)) & (peaks.height + off >= best[curve]))
+    found = (off > np.maximum(tolerance, NARROW * fall)) & (peaks.height + off >= best[curve])
+    # A parabola falls to the sample after the next by twice its mean fall to the next, or more: a shoulder is no such.
+    shoulder = (around[:, 3] - np.maximum(around[:, 1], around[:, 5]) < fall) & (fall > tolerance)
+    return np.flatnonzero(found | (shoulder & (peaks.height + fall >= best[curve])))
 
 
 def dips(requests: Sequence[Request], columns: Mapping[str, Array], resolved: Mask) -> PeakCandidates:

@@ -213,3 +213,25 @@ def test_a_top_between_two_samples_that_are_both_outside_a_narrow_window_counts(
     low, high = s.min() + np.array(part) * np.ptp(s)
     assert found.status == st.OK
     assert dev[(s >= low) & (s <= high)].max() <= found.max_dev + found.err_max_dev
+
+
+# Two tops 1.4 samples apart: the samples rise over the higher one to the lower one, 8e-6 below it.
+SHOULDER = {
+    "h_a": 0.375058, "h_b": 3.265787, "h_c": 1.932631, "h_e": 3.820732, "h_f": -0.033506, "h_g": 0.034227,
+    "h_alpha": -0.007729, "rh": 1.209538, "dh": -0.363911, "xE": 4.344025, "yE": 0.762974, "rE": 0.191921,
+    "dE": 0.864060, "q": 2.134218, "fx": -1.719096, "fy": 0.582336, "tx": -0.288098, "ty": 0.935314,
+    "tooth": 0.024756, "pitch": -0.031249, "y_plate": 1.745665, "h_sigma": -1.0, "bar_branch": -1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("target", [1e-3, 1e-5, 1e-8])
+def test_a_higher_top_on_the_shoulder_of_another_is_found(target):
+    poses = sweep.evaluate("feed", SHOULDER, ["y_f"], phi=np.linspace(0.6, 1.1, 50_001))
+    values = poses.y_f.to_numpy()
+    inner = values[1:-1]
+    tops = inner[(inner > values[:-2]) & (inner >= values[2:])]
+    assert len(tops) == 2 and 5e-6 < tops[0] - tops[1] < 1.5e-5
+    found = sweep.summarise("feed", SHOULDER, ["max_y_f", "phi_max_y_f"], accuracy=target).iloc[0]
+    assert found.status == st.OK and 0.6 < found.phi_max_y_f < 0.75
+    # poses 1e-5 rad apart lie 1e-11 below a top at most
+    assert abs(found.max_y_f - tops[0]) <= found.err_max_y_f + 1e-11
