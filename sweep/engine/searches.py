@@ -160,11 +160,11 @@ def _proven(study: Study, folder: Path, jobs: int, backend: str, progress: bool)
     """Run the proof over the boxes, on as many cores as there are workers."""
     assert study.optimise is not None and study.optimise.prove is not None
     boxes = study.optimise.prove.boxes
-    words = "proving; run again to continue"
-    with _stoppable(folder, words) as stop, Progress("proof", boxes, 0, progress, unit="boxes") as bar:
+    words, unit = "proving; run again to continue", "boxes, a first proof compiles before them"
+    with _stoppable(folder, words) as stop, Progress("proof", boxes, 0, progress, unit=unit) as bar:
 
         def tell(judged: int, expected: int) -> None:
-            bar.expect(expected)
+            bar.expect(expected, "boxes" if judged else unit)
             bar.advance(judged - bar.done)
 
         where: Executor = Here() if jobs == 1 else executor(backend, jobs)

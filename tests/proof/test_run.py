@@ -13,6 +13,8 @@ from click.testing import CliRunner
 from studies import proof_space
 from sweep.cli import main
 from sweep.dataset import files
+from sweep.engine import searches
+from sweep.jobs import progress
 from sweep.jobs.executors import Here
 from sweep.jobs.signals import Stop
 from sweep.nights.carry import carry, searched
@@ -172,6 +174,25 @@ def test_plan_says_what_is_to_be_proven(tmp_path: Path) -> None:
     code, text = ran(written(tmp_path), "check")
     assert code == 0
     assert "proof: that no design is better than the optimum by more than 1 %, over phi0, phi_ext; at most 4000" in text
+
+
+def test_first_boxes_are_told_with_what_they_wait_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A first proof stood at 0 boxes for two minutes and did not say that it was compiling."""
+
+    def waits(study: Any, folder: Path, cores: Cores, tell: Any) -> None:
+        tell(0, 4000)
+        monkeypatch.setattr(progress, "FIRST_SECONDS", -1.0)
+        tell(0, 4000)
+        monkeypatch.setattr(progress, "LINE_SECONDS", -1.0)
+        tell(7, 4000)
+
+    monkeypatch.setattr(searches, "prove_study", waits)
+    searches._proven(load_study(written(tmp_path)), tmp_path, 1, "threading", True)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "proof: 0 of 4000 boxes (0%), a first proof compiles before them, 0 s"
+    assert all(line == "proof: 7 of 4000 boxes (0%), 0 s" for line in lines[1:]) and len(lines) > 1
 
 
 def test_space_without_feasible_designs_ends_with_4_and_the_proof_of_it(tmp_path: Path) -> None:
