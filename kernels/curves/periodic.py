@@ -205,7 +205,7 @@ def _top(c: Array, s: Array, sign: float, look: Array, j: int, least: float) -> 
 
 @part
 def _peak(c: Array, s: Array, sign: float, look: Array, err: float) -> tuple[float, float]:
-    """Find the value farthest in the sense of ``sign``, and its crank angle in [0, 2 pi), from equidistant samples.
+    """Find the value farthest in the sense of ``sign``, and its crank angle in [0, 2 pi], from equidistant samples.
 
     Of tops that differ by less than twice their error, a share ``err`` of the size, the first of the turn counts.
     """
