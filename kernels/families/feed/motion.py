@@ -211,26 +211,26 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
         status[i] = worst
         if worst != st.OK:
             continue
-        crossings, longest, first, last = 0, -1, 0, 0
+        crossings, entry, leave = 0, 0.0, 0.0
         for j in range(SAMPLES):
             after = heights[(j + 1) % SAMPLES]
             if (heights[j] > 0.0) != (after > 0.0):
                 crossings += 1
             if heights[j] <= 0.0 < after:
                 # around the seam of the turn: a stay may begin before phi = 2 pi and end after it
-                stay = 1
-                while heights[(j + 1 + stay) % SAMPLES] > 0.0:
-                    stay += 1
-                if stay > longest:
-                    longest, first, last = stay, j, j + stay
+                last = j + 1
+                while heights[(last + 1) % SAMPLES] > 0.0:
+                    last += 1
+                low, high = heights[last % SAMPLES], heights[(last + 1) % SAMPLES]
+                begin = false_position(_height, j * step, (j + 1) * step, heights[j], after, r, 0)
+                end = false_position(_height, last * step, (last + 1) * step, low, high, r, 0)
+                # the longer one of two stays may have fewer samples: the angles decide
+                if end - begin > leave - entry:
+                    entry, leave = begin, end
         outputs[8, i] = crossings
         if crossings == 0:
             status[i] = st.NO_EVENT
             continue
-        before, after = heights[first], heights[(first + 1) % SAMPLES]
-        entry = false_position(_height, first * step, (first + 1) * step, before, after, r, 0)
-        before, after = heights[last % SAMPLES], heights[(last + 1) % SAMPLES]
-        leave = false_position(_height, last * step, (last + 1) * step, before, after, r, 0)
         one, _ = tooth_at(r, math.cos(entry), math.sin(entry))
         two, _ = tooth_at(r, math.cos(leave), math.sin(leave))
         rise, area, change = _between(r, entry, leave)

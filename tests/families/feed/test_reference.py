@@ -330,3 +330,27 @@ def test_rise_is_that_of_the_stay_that_feeds_where_a_shorter_one_reaches_higher(
     # a step misses (feed_angle/8000)^2/2 of the bend at most
     assert got.rise == pytest.approx(heights.max(), abs=1e-6)
     assert got.crossings == 4.0 and got.max_y_t - rack["y_plate"] > got.rise + 0.05
+
+
+@pytest.mark.parametrize("y_plate", [-0.0168, -0.0166, -0.0165])
+def test_of_two_nearly_equal_stays_above_the_plate_the_longer_one_counts(y_plate):
+    """The stays differ by less than a sample of the turn, and the samples show them as equally long."""
+    design = {
+        "h_a": 0.51216, "h_b": 3.74699, "h_c": 1.39102, "h_e": 4.5279, "rh": 0.83457, "dh": 2.27514, "xE": 6.36349,
+        "yE": 0.75936, "rE": 0.1762, "dE": 1.28248, "q": 2.78387, "fx": -1.53956, "fy": 0.59574, "tx": -0.34673,
+        "ty": 0.69334, "h_sigma": -1.0, "bar_branch": -1.0, "y_plate": y_plate,
+    }  # fmt: skip
+    phi = np.linspace(0.0, 2.0 * np.pi, 100_001)
+    height = sweep.evaluate("feed", design, ["y_t"], phi=phi).y_t.to_numpy() - y_plate
+    assert height[0] < 0.0
+    before, after = height[:-1], height[1:]
+    passes = np.flatnonzero((before > 0.0) != (after > 0.0))
+    angles = phi[passes] + phi[1] * before[passes] / (before[passes] - after[passes])
+    stays = angles[1::2] - angles[::2]
+    assert len(stays) == 2 and 5e-4 < abs(stays[1] - stays[0]) < 2.0 * np.pi / 256
+    longer = stays.argmax()
+    found = sweep.summarise("feed", design, ["phi_entry", "feed_angle", "phi_leave"]).iloc[0]
+    # a secant over 6e-5 rad misses a passage by its square
+    assert found.phi_entry == pytest.approx(angles[2 * longer], abs=1e-7)
+    assert found.phi_leave == pytest.approx(angles[2 * longer + 1], abs=1e-7)
+    assert found.feed_angle == pytest.approx(stays[longer], abs=1e-7)
