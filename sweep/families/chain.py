@@ -235,7 +235,7 @@ def _plan(stages: tuple[Stage, ...], outputs: Mapping[str, Output], wanted: froz
     del plan.needed[deepest + 1 :]
     for k, stage in enumerate(stages[:deepest]):
         plan.needed[k] |= driving_names(stage.family, stages[k + 1].family)
-        plan.needed[k] |= set(stage.family.derivatives(stage.family.position, plan.order))
+        plan.needed[k] |= set(stage.family.derivatives(stage.family.position, plan.order)[1:])
     return plan
 
 
