@@ -1,4 +1,4 @@
-"""Which assembly of the rack on three leads a guess chooses: the same one in every unit of length."""
+"""A rack on three leads: plain root finding, locks, and the assembly that a guess chooses, alike in every unit."""
 
 from __future__ import annotations
 
@@ -6,14 +6,86 @@ import math
 
 import numpy as np
 import pytest
+from mpmath import mp, mpf
 
 import sweep
 from kernels import status as st
+from kernels.families import feed
 from sweep.families import family
-from tests.families.feed.test_reference import TRIAD
+from sweep.families.feed import TRIAD_PARAMETERS
+from tests.families.feed.test_reference import RACK
 from tests.reference import feed as naive
 
+TRIAD = {
+    "h_a": 0.5, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "xE2": 2.0, "yE2": -2.5, "rE2": 0.15, "dE2": 0.3,
+    "xE3": 5.5, "yE3": -2.5, "rE3": 0.15, "dE3": 0.5, "f1x": -1.0, "f1y": -0.5, "f2x": -0.8, "f2y": -0.6, "f3x": 1.2,
+    "f3y": -0.6, "q1": 1.5, "q2": 2.5, "q3": 2.5, "x0": 4.0, "y0": 1.0, "chi0": 0.0, "h_sigma": -1.0,
+}  # fmt: skip
 LENGTHS = tuple(p.name for p in family("feed_triad").parameters if p.unit == "length")
+
+
+def test_triad_equals_plain_root_finding():
+    names = ["x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi"]
+    phi = np.array([0.0, 1.1, 2.5, 4.0, -1.0, 7.3])
+    got = sweep.evaluate("feed_triad", TRIAD, names, phi=phi)
+    assert (got.status == st.OK).all()
+    with mp.workdps(60):
+        p = {name: mpf(TRIAD.get(name, 0.0)) for name in (p.name for p in TRIAD_PARAMETERS)}
+        for k, angle in enumerate(phi):
+            start = tuple(got.loc[k, ["x_t", "y_t", "chi"]])
+            found = naive.triad(p, mpf(angle), start)
+            np.testing.assert_allclose(list(start), [float(x) for x in found], rtol=0, atol=2e-14)
+            step = mpf(10) ** -8
+            before, after = (naive.triad(p, angle + s * step, start) for s in (-1, 1))
+            for m, name in enumerate(("x_t", "y_t", "chi")):
+                slope, bend = (after[m] - before[m]) / (2 * step), (after[m] - 2 * found[m] + before[m]) / step**2
+                # differences of 1e-8 are good to 1e-15
+                assert abs(got[f"d{name}"][k] - float(slope)) < 1e-12
+                assert abs(got[f"d2{name}"][k] - float(bend)) < 1e-11
+    closed = sweep.evaluate("feed_triad", TRIAD, names[:3], phi=[0.0, 2.0 * math.pi])
+    np.testing.assert_allclose(closed.loc[0, names[:3]], closed.loc[1, names[:3]], rtol=0, atol=1e-14)
+
+
+def test_triad_with_a_link_of_the_dyad_repeats_the_dyad():
+    # a lead pinned to H by a tiny link and the lift coupler as the second; the third only follows the tooth
+    dyad = sweep.evaluate("feed", RACK, ["x_t", "y_t", "chi", "x_h", "y_h"], phi=[0.0, 1.0])
+    tiny = 1e-7
+    start = dyad.iloc[0]
+    f1 = (-RACK["tx"], -RACK["ty"])
+    f2 = (RACK["fx"] - RACK["tx"], RACK["fy"] - RACK["ty"])
+    far = (start.x_t + 50.0, start.y_t)
+    given_values = {k: RACK[k] for k in ("h_a", "h_b", "h_c", "h_e", "rh", "dh", "h_sigma")} | {
+        "xE2": RACK["xE"], "yE2": RACK["yE"], "rE2": RACK["rE"], "dE2": RACK["dE"], "q2": RACK["q"],
+        "xE3": far[0], "yE3": far[1], "rE3": 0.0, "dE3": 0.0, "q3": 50.0, "f3x": 0.0, "f3y": 0.0,
+        "f1x": f1[0], "f1y": f1[1], "f2x": f2[0], "f2y": f2[1], "q1": tiny,
+        "x0": start.x_t + tiny, "y0": start.y_t, "chi0": start.chi,
+    }  # fmt: skip
+    got = sweep.evaluate("feed_triad", given_values, ["x_t", "y_t", "chi"], phi=[0.0])
+    assert got.status[0] == st.OK
+    for name in ("x_t", "y_t", "chi"):
+        assert got[name][0] == pytest.approx(start[name], abs=5.0 * tiny)
+
+
+def test_triad_that_locks_or_has_no_assembly_says_so():
+    parallel = TRIAD | {"f2x": -1.0, "f3x": -1.0, "f2y": -0.5, "f3y": -0.5, "f1x": -1.0}
+    assert set(sweep.evaluate("feed_triad", parallel, "x_t", phi=[0.0, 3.0]).status) == {st.NOT_ASSEMBLED}
+    short = sweep.evaluate("feed_triad", TRIAD | {"q2": 0.01, "q3": 0.01}, "x_t", phi=[1.0])
+    assert short.status[0] == st.NOT_ASSEMBLED and math.isnan(short.x_t[0])
+    assert sweep.evaluate("feed_triad", TRIAD | {"h_a": 4.0}, "x_t", phi=[3.0]).status[0] == st.NOT_ASSEMBLED
+
+
+def test_triad_jitted_equals_plain():
+    matrix = np.array([[TRIAD.get(name, 0.0) for name in (p.name for p in TRIAD_PARAMETERS)]] * 2)
+    matrix[1, 24] = 0.01
+    phi = np.array([[0.0, 2.0]])
+    results = []
+    for function in (feed.triad_poses, feed.triad_poses.py_func):
+        status, out = np.empty((2, 2), np.uint8), np.empty((10, 2, 2))
+        with np.errstate(all="ignore"):
+            function(matrix, phi, status, out)
+        results.append((status, out))
+    for one, two in zip(*results, strict=True):
+        np.testing.assert_array_equal(one, two)
 
 
 @pytest.mark.parametrize("unit", [1000.0, 25.4, 0.1])
