@@ -123,7 +123,7 @@ def extremes(
     inertia = inertia + grid.inputs["flywheel"][:, None]
     turned = Turned(0.5 * inertia * speed**2, inertia * change + 0.5 * slope * speed**2, even)
     # The motor's mean torque misses over a turn what the energy misses; half its share is missed by the speed.  That is
-    # an estimate, as a pulse shorter than a sample is missed by more; of 90 crank-rockers none missed 0.7 of the whole.
+    # an estimate: a pulse shorter than a sample is missed by more.
     felt = 0.5 * (np.abs(slope) + grid.inputs["motor_slope"][:, None] / np.abs(speed))
     shift = known * ((inertia.mean(axis=1)[:, None] / TWO_PI + felt) * speed**2 / inertia).max(axis=1)
     curves = _curves(grid, turned, status)
