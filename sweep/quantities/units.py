@@ -81,6 +81,7 @@ def example(internal: str) -> str:
     return _EXAMPLES.get(internal, f"in units such as {internal}")
 
 
+@lru_cache
 def internal_unit(word: str) -> str:
     """Return the internal unit of a unit word: "length" -> "mm", "force/length" -> "N/mm", "sign" -> "1"."""
     word = spelt_out(word)
