@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+INFEASIBLE = 4  # exit code where no design keeps all limits, which is an answer and no error
 LONGEST = 200  # characters of a value in a message
 MOST_FAULTS = 30  # of a study file in its message
 MOST_NAMES = 40  # in one list of a message

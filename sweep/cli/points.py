@@ -10,14 +10,15 @@ import pandas as pd
 from sweep.cli.families import complete_families
 from sweep.cli.options import A_FILE, DESIGN, FOLDER, IS_FILE
 from sweep.cli.tables import checked_format, refuse_degrees, write_table
+from sweep.cli.workbook import write_workbook
 from sweep.dataset.files import beside, located
+from sweep.errors import INFEASIBLE
 from sweep.exchange.export import FORMATS, MOST_POSES
 from sweep.exchange.export import export as write
 from sweep.exchange.points import TOLERANCE, drawn
 from sweep.families import family as find_family
 from sweep.plot.sheet import write_sheet
 from sweep.report.dataset import chosen
-from sweep.report.workbook import write_workbook
 from sweep.study.task import load_task
 from sweep.study.toml import design_entries, toml
 from sweep.synthesis.tasks import solve
@@ -99,9 +100,6 @@ def _place(folder: Path, name: str) -> Path:
     return place / name
 
 
-NOTHING = 4  # same exit code as `sweep run`: no design within the limits
-
-
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
@@ -128,4 +126,4 @@ def task(file: Path, candidates: int, starts: int, samples: int, seed: int, out:
         rows = [s.mechanism | {"objective": s.objective, "feasible": s.feasible} for s in solutions]
         write_table(pd.DataFrame(rows), out)
     if not any(s.feasible for s in solutions):
-        raise click.exceptions.Exit(NOTHING)
+        raise click.exceptions.Exit(INFEASIBLE)

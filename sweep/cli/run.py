@@ -47,10 +47,10 @@ def run(
     same, bit for bit, with any number of workers.  The answer comes last; where no design keeps all limits, it says
     which of them have to give way, and the exit code is 4.
     """
+    from sweep.cli.ending import ending
     from sweep.engine.opening import is_part  # the engine takes a second to import, which --help avoids
     from sweep.engine.run import run as run_study
     from sweep.engine.searches import stages_of
-    from sweep.report.terminal import ending
     from sweep.study import load_study
 
     proof = True if certify else None

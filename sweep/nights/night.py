@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from sweep.dataset import chunk_files, files, store
-from sweep.errors import InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied, how_many
+from sweep.errors import INFEASIBLE, InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied, how_many
 from sweep.nights import archive
 from sweep.nights.archive import Journal, NightRecord, State, StudyRecord
 from sweep.nights.carry import REPORT, Carried, carry
 from sweep.nights.changes import Changes, changes, figures, slower
 from sweep.nights.page import write_page
 from sweep.nights.studies import FIGURE, RUN_LOG, Ended, StudyEntry, call, draw, in_order, notify, studies_in
-from sweep.report.terminal import INFEASIBLE
 from sweep.study import Study
 
 # Exit codes that a run sets itself; any other is that of a process that died.

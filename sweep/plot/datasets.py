@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.errors import InputError
-from sweep.report import maps
+from sweep.report import figures
 from sweep.report.dataset import gather, read_dataset
 from sweep.report.figures import LIMIT, NARROW, OPTIMUM, QUIET, REFERENCE, house_style, new_figure
 from sweep.report.made import Histogram, histogram, slopes, spreads, tolerance_words
@@ -57,7 +57,7 @@ def map(folder: str | Path, x: str | None = None, y: str | None = None) -> NDArr
         if pair is None:
             raise InputError("axes", [x, y], "two different swept parameters", str(folder))
     with house_style():
-        figure = maps.design_map(data, scanned, cells, None if pair is None else (str(pair[0]), str(pair[1])))
+        figure = figures.design_map(data, scanned, cells, None if pair is None else (str(pair[0]), str(pair[1])))
     drawn = _drawn(figure, folder, "a study that sweeps a parameter and has feasible designs")
     return np.array(drawn.axes[: 1 if data.objective is None else 2], dtype=object)
 
@@ -87,7 +87,7 @@ def front(folder: str | Path) -> Axes:
     """
     data, scanned, _ = gather(Path(folder))
     with house_style():
-        figure = maps.trade_off(data, scanned)
+        figure = figures.trade_off(data, scanned)
     return _drawn(figure, folder, "a study with an objective and a second criterion").axes[0]
 
 

@@ -1,10 +1,10 @@
-"""The front: the cost of each bound on the second output, as a table, a sentence and a curve."""
+"""The front: the cost of each bound on the second output, as a table and sentences."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +15,8 @@ from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.kkt import NO_VALUE
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, records
-from sweep.report.figures import LIMIT, OPTIMUM
 from sweep.report.quantities import ShownQuantity, change, number
 from sweep.study import ParetoSettings
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 EDGES = (" at its lower bound", " at its upper bound")
 
@@ -68,7 +63,7 @@ class Front:
         best = math.nan if optimum is None else float(optimum[objective.name])
         rows = []
         for point in self.points:
-            value, missed = float(point[objective.name]), _missed(point)
+            value, missed = float(point[objective.name]), is_missed(point)
             relaxed, active = str(point["relaxation"]), str(point["active"])
             rows.append(
                 FrontRow(
@@ -86,7 +81,7 @@ class Front:
     def sentence(self) -> str:
         """Return a sentence about the ends of the front, and about the bounds within which no design was found."""
         objective, second = self.objective, self.second
-        points, missed = ([p for p in self.points if _missed(p) == beyond] for beyond in (False, True))
+        points, missed = ([p for p in self.points if is_missed(p) == beyond] for beyond in (False, True))
         beyond = ""
         if missed:
             of = f"{len(missed)} of {how_many(len(self.points), 'bound')} on the {second.words}"
@@ -114,8 +109,8 @@ class Front:
     def _gap(self) -> str:
         """Name the largest gap of the front, if it is large enough to mention."""
         objective, second, points = self.objective.name, self.second, self.points
-        reached = [float(p["bound"]) if _missed(p) else compared(second.name, float(p[second.name])) for p in points]
-        values = [math.nan if _missed(p) else float(p[objective]) for p in points]
+        reached = [float(p["bound"]) if is_missed(p) else compared(second.name, float(p[second.name])) for p in points]
+        values = [math.nan if is_missed(p) else float(p[objective]) for p in points]
         bounds = np.array([float(p["bound"]) for p in points])
         largest = gaps(bounds, np.array(reached), np.array(values))
         if not largest or largest[0].area < SHOWN:
@@ -125,20 +120,9 @@ class Front:
         count = self.settings.points or len(points)
         return f" It is least known between {ends}: pareto.points, now {count}, places further bounds there."
 
-    def draw(self, axes: Axes) -> None:
-        """Draw the front as a curve through its designs, and the bounds without a design."""
-        both, good = (self.objective, self.second), [p for p in self.points if not _missed(p)]
-        if good:
-            x, y = (np.array([compared(q.name, float(p[q.name])) * q.factor for p in good]) for q in both)
-            label = f"front ({len(good)})"
-            axes.plot(x, y, color=OPTIMUM, linewidth=1.6, marker="o", markersize=5, zorder=4, label=label)
-        missed = [float(p["bound"]) * self.second.factor for p in self.points if _missed(p)]
-        for k, bound in enumerate(missed):
-            words = "bounds without a design" if k == 0 else None
-            axes.axhline(bound, color=LIMIT, linewidth=0.8, linestyle=(0, (6, 4)), label=words)
 
-
-def _missed(point: dict[str, Any]) -> bool:
+def is_missed(point: dict[str, Any]) -> bool:
+    """Tell whether no design was found within a bound."""
     return int(point["status"]) == codes.LIMIT_EXCEEDED
 
 

@@ -16,9 +16,9 @@ from sweep.evaluation.statuses import meaning
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.manufacture.tolerance import COST_SAMPLE, TELLING_GAIN
 from sweep.pages import rendered
-from sweep.report import answer, maps, tables
+from sweep.report import answer, tables
 from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, read_dataset, read_rows, row_of
-from sweep.report.figures import data_uri, house_style, save
+from sweep.report.figures import data_uri, design_map, house_style, save, trade_off
 from sweep.report.front import Front
 from sweep.report.live import embedded, live, moving, scripts_of
 from sweep.report.made import (
@@ -155,7 +155,7 @@ def draw(data: Dataset, scanned: Scan, cells: list[Cells], folder: Path) -> dict
     if not (len(cells) and scanned.feasible) and data.front is None:
         return {}
     with house_style():
-        drawn = {"map": maps.design_map(data, scanned, cells), "trade-off": maps.trade_off(data, scanned)}
+        drawn = {"map": design_map(data, scanned, cells), "trade-off": trade_off(data, scanned)}
         return {
             name.replace("-", "_"): data_uri(save(figure, folder / f"{name}.svg"))
             for name, figure in drawn.items()

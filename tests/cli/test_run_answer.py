@@ -13,12 +13,12 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
+from sweep.cli.ending import held_back
 from sweep.quantities.limits import Limit
 from sweep.report.answer import share_words
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.tables import limit_state
-from sweep.report.terminal import held_back
 from tests.optimise.test_study import STUDY
 
 
@@ -136,7 +136,7 @@ def test_unseen_share_that_cannot_be_is_refused(tmp_path: Path, unseen: str) -> 
     assert code == 2 and "optimise.unseen" in text
 
 
-@pytest.mark.parametrize("moment", ["sweep.engine.run.search", "sweep.report.terminal.ending"])
+@pytest.mark.parametrize("moment", ["sweep.engine.run.search", "sweep.cli.ending.ending"])
 @pytest.mark.parametrize("gone", ["out", "out/designs", "out/_plan.json"])
 def test_what_is_removed_behind_the_sweep_is_a_fault_of_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moment: str, gone: str

@@ -15,11 +15,11 @@ from click.testing import CliRunner, Result
 
 import sweep
 from sweep.cli import main
+from sweep.cli.ending import Ending
 from sweep.cli.families import family_names
 from sweep.cli.kernels import WarmPart, rounds
 from sweep.cli.main import VERBS
 from sweep.cli.tables import read_table, wanted
-from sweep.report.terminal import Ending
 from sweep.study import load_study
 
 STUDY = """
@@ -242,7 +242,7 @@ def test_run_passes_its_options_on(study: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("sweep.engine.run.run", run)
     ended = Ending(("the answer",), 0, "next: more")
     (study / "smoke.toml").write_text("")
-    monkeypatch.setattr("sweep.report.terminal.ending", lambda folder: ended)
+    monkeypatch.setattr("sweep.cli.ending.ending", lambda folder: ended)
     options = ("--jobs", 3, "--backend", "loky", "--accuracy", 1e-5, "--smoke", "--force", "--out", "x")
     assert call("run", study, *options).output == "the answer\nnext: more\ndataset: somewhere\n"
     loaded, *others = given["positional"]

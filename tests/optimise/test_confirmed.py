@@ -14,6 +14,7 @@ import pytest
 import sweep
 from kernels import status as st
 from studies.accuracy.ordinary import designs
+from sweep.cli.ending import ending
 from sweep.dataset.files import OPTIMUM, beside
 from sweep.effects import extended
 from sweep.engine.run import run
@@ -23,7 +24,6 @@ from sweep.optimise import Problem, Result, minimise
 from sweep.optimise.extrema import points
 from sweep.optimise.extrema import scanned as edges
 from sweep.optimise.local.start import DIFFERS
-from sweep.report.terminal import ending
 from sweep.study import Limit, OptimiseSettings, load_study
 
 ONCE = OptimiseSettings(starts=1, seed=1, looks=400)

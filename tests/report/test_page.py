@@ -20,9 +20,8 @@ from sweep.errors import InputError, StoreError
 from sweep.plot.mechanisms import aligned_turn
 from sweep.report.answer import answer, searched
 from sweep.report.dataset import gather, marked
-from sweep.report.figures import house_style
+from sweep.report.figures import design_map, house_style, map_figure, overlays
 from sweep.report.live import in_window, lowest, without_jumps
-from sweep.report.maps import design_map, map_figure, overlays
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import Cells, Grid, divided_axes

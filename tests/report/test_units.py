@@ -12,8 +12,8 @@ from kernels import status as codes
 from sweep.optimise.multistart.survey import Survey
 from sweep.report.answer import survey_warnings
 from sweep.report.dataset import Dataset, gather, without_rows
+from sweep.report.figures import trade_off
 from sweep.report.front import Front
-from sweep.report.maps import trade_off
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import scan

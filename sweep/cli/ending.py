@@ -15,7 +15,7 @@ from kernels import status as codes
 from sweep.chunks.plan import spread_designs
 from sweep.dataset import files
 from sweep.dataset.reading import best
-from sweep.errors import how_many
+from sweep.errors import INFEASIBLE, how_many
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Angles, Interval
@@ -31,7 +31,6 @@ from sweep.report.tables import bound_words, limit_states, limited
 from sweep.study import Limit, Study
 from sweep.synthesis.fit import fit_line
 
-OK, INFEASIBLE = 0, 4
 TURN = np.arange(360, dtype=np.float64) * (2.0 * math.pi / 360)
 LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought without an optimiser
 
@@ -81,7 +80,7 @@ def ending(folder: Path) -> Ending:
         lines.append(f"warning: time ran out: {data.front_steps} steps of the front")
     # No-break spaces keep values with their units on a page; tools of a shell expect plain ones.
     lines = [line.replace("\u00a0", " ") for line in lines]
-    return Ending(tuple(lines), INFEASIBLE if missed else OK, f"next: sweep report {shlex.quote(str(folder))}")
+    return Ending(tuple(lines), INFEASIBLE if missed else 0, f"next: sweep report {shlex.quote(str(folder))}")
 
 
 def _best_of_sweep(data: Dataset, feasible: int) -> str:

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 
 import sweep
 from sweep.cli import main
+from sweep.cli.workbook import write_workbook
 from sweep.dataset.reading import best
 from sweep.errors import InputError
-from sweep.report.workbook import write_workbook
 from sweep.study import study_from_data
 from tests.support.report_dataset import write_dataset
 
