@@ -45,6 +45,7 @@ class Route:
     general : name of the general reduction; "" for a family's own step or an effect
     order : kind of work, and the place among routes of that kind
     columns : number of leading columns of the design matrix that ``run`` reads; None for all
+    stuck : whether the outputs say something of designs whose crank does not turn, as margins do
     """
 
     name: str
@@ -54,6 +55,7 @@ class Route:
     general: GeneralRoute | Literal[""] = ""
     order: tuple[Work, int] = (Work.SEARCH, 0)
     columns: int | None = None
+    stuck: bool = False
 
 
 def check_window(window: tuple[float, float] | None) -> None:

@@ -6,6 +6,7 @@ A composed output, and an output of a machine's member, calls `design_outputs` f
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -41,6 +42,7 @@ PARTIAL = (
     st.NO_TRIANGLE, st.NO_WINDOW,
 )  # fmt: skip
 GOES_ON = np.isin(np.arange(256), PARTIAL)
+GOES_ON_STUCK = np.isin(np.arange(256), (*PARTIAL, st.NOT_ROTATABLE))  # a crank that does not turn has its margin
 
 Compose: TypeAlias = Callable[[Array, Columns], route.Composed]
 """Function that composes an output from designs (n, P) and the columns of other outputs."""
@@ -87,7 +89,8 @@ def design_outputs(
             if step.general and not decided:  # quicker outputs such as the margin are computed by now
                 status, decided = np.where(status == st.OK, _turning(family, designs, accuracy), status), True
             # A follower that turns fully lacks limit positions or a dwell, but has extrema; one that jams still moves.
-            alive = np.flatnonzero(GOES_ON[status]) if status.any() else None  # None means all
+            goes_on = GOES_ON_STUCK if step.stuck else GOES_ON
+            alive = np.flatnonzero(goes_on[status]) if status.any() else None  # None means all
             rows = designs if alive is None or alive.size == n else designs[alive]
             results = step.run(rows, accuracy, window)
             for name in with_errors(step.outputs, accuracy):
@@ -177,7 +180,14 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
             raise _unserved(family, name, accuracy)
     selected += [own_route(step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
     selected += [general_route(family, *key, tuple(names), accuracy, windowed) for key, names in groups.items()]
+    stuck = {name for name, quantity in quantities.items() if _of_stuck(quantity)}
+    selected = [replace(chosen, stuck=chosen.stuck or stuck.issuperset(chosen.outputs)) for chosen in selected]
     return tuple(sorted(selected, key=lambda chosen: (*chosen.order, chosen.name)))
+
+
+def _of_stuck(quantity: Quantity) -> bool:
+    """Whether a quantity says something of a design whose crank does not turn: a margin, or its negative."""
+    return isinstance(quantity, Margin) or (isinstance(quantity, Negative) and _of_stuck(quantity.inner))
 
 
 def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
@@ -251,10 +261,12 @@ def _of_members(
         for inner in routes(m.family, outputs_of[m.name], accuracy, windowed):
             names = tuple(f"{m.name}.{name}" for name in inner.outputs)
             run = partial(_of_member, m, inner)
-            selected.append(Route(f"{m.name}: {inner.name}", names, inner.ns_per_design, run, order=inner.order))
+            title, cost = f"{m.name}: {inner.name}", inner.ns_per_design
+            selected.append(Route(title, names, cost, run, order=inner.order, stuck=inner.stuck))
     if margin:
         cost = sum(group_ns(m.family, "margin", (), accuracy) for m in machine.members)
-        selected.append(Route("margins", tuple(margin), cost, partial(_margins, machine), order=(Work.QUICK, 0)))
+        run = partial(_margins, machine)
+        selected.append(Route("margins", tuple(margin), cost, run, order=(Work.QUICK, 0), stuck=True))
     return selected, remaining
 
 

@@ -66,6 +66,36 @@ def test_margin_on_samples_is_that_of_the_margin_alone_whatever_is_asked_beside_
     assert both.status.tolist() == [st.NOT_ROTATABLE, st.OK] and np.isnan(both[beside][0])
 
 
+LOCKED = {"a": 25.0, "b": 30.0, "c": 30.0, "e": 60.0, "f": 0.0, "g": 0.0, "alpha": 0.3}  # its crank does not turn
+CHAINED = {f"{p}1": x for p, x in LOCKED.items()} | {f"{p}2": x for p, x in family("guide").example.items()}
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "design", "margins", "beside"),
+    [
+        ("rssr", LOCKED, ["margin"], ["swing", "least_transmission_angle"]),
+        ("slider_crank", {"a": 30.0, "b": 20.0}, ["margin", "minus_margin"], ["stroke", "least_transmission_angle"]),
+        (["rssr", "guide"], CHAINED, ["margin"], ["swing1"]),
+        (["rssr", "guide"], CHAINED, ["margin", "margin1"], ["phi_ext1", "least_transmission_angle1"]),
+        (
+            {"arm": {"family": "rssr"}},
+            {f"arm.{p}": x for p, x in LOCKED.items()},
+            ["margin", "arm.margin"],
+            ["arm.swing", "arm.least_transmission_angle"],
+        ),
+    ],
+)
+def test_margin_of_what_does_not_turn_is_there_whatever_is_asked_beside_it(mechanism, design, margins, beside):
+    """An output asked beside it found first that the crank does not turn; the margin was nan then."""
+    alone = sweep.summarise(mechanism, design, margins[:1])[margins[0]][0]
+    found = sweep.summarise(mechanism, design, [*beside, *margins]).iloc[0]
+    assert alone < 0.0
+    for name in margins:
+        assert found[name] == (-alone if name.startswith("minus") else alone)  # the same double
+        assert 0.0 < found[f"err_{name}"] < 1e-12
+    assert np.isnan(found[beside].to_numpy(float)).all() and found.status == st.NOT_ROTATABLE
+
+
 @pytest.mark.parametrize(("name", "offset"), [("inverted_slider_crank", "h"), ("slotted", "s")])
 def test_error_of_the_margin_of_a_slot_that_does_not_reach_is_rounding(name, offset):
     """There the motion is singular, the discriminant is not: the error of its least value was larger than that."""
