@@ -24,7 +24,7 @@ from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.multistart.survey import optima_words
 from sweep.quantities.limits import compared
-from sweep.report.answer import proof_sentence, search_words, share_words, survey_warnings
+from sweep.report.answer import proof_sentence, search_words, share_words, shortest_link, survey_warnings, unsettled
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.front import Front
 from sweep.report.tables import bound_words, limit_states, limited
@@ -112,6 +112,7 @@ def _optimum(data: Dataset) -> list[str]:
             if math.isfinite(share)
             else []
         ),
+        *(f"warning: {words}" for words in (*unsettled(data.optimum), *shortest_link(data))),
     ]
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from kernels import status as codes
 from sweep.dataset import files
@@ -14,6 +17,7 @@ from sweep.optimise.local.start import DIFFERS
 from sweep.optimise.multistart.survey import Survey, optima_words
 from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
+from sweep.quantities.dimensions import LINK_RATIO, sizes
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset
 from sweep.report.front import Front
@@ -33,6 +37,7 @@ from sweep.report.tables import (
 MISSED = ("missed", "unknown")
 NEAREST = 4  # inactive limits named in the answer; the table has them all
 BEHIND = 1e-6  # relative difference by which a known design must be better than the optimum
+SLIGHTEST = 0.01  # link ratio below which no mechanism is built: a crank of 1 mm at a rod of 100 mm
 NO_PROOF = "This is no proof of a global optimum"
 
 
@@ -127,10 +132,7 @@ def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
     faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
     objective = data.objective
     if data.optimum is not None:
-        residual = value_of(data.optimum, "kkt_residual")
-        if not residual <= KKT:
-            late = data.optimum.get("ended") == "time"
-            faults.append(f"the optimiser {'had no time left to settle' if late else 'did not settle'}")
+        faults += unsettled(data.optimum)
         wanted_yield = data.study.wanted_yield
         share = value_of(data.optimum, "yield")
         if wanted_yield is not None and share < wanted_yield:
@@ -140,6 +142,25 @@ def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
             if not compared(objective.name, value) <= compared(objective.name, best) + BEHIND * abs(best):
                 faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
+
+
+def unsettled(optimum: Mapping[str, Any]) -> list[str]:
+    """Say that the optimiser stopped before the optimality conditions held; nothing where they hold."""
+    if float(optimum.get("kkt_residual", math.nan)) <= KKT:
+        return []
+    return [f"the optimiser {'had no time left to settle' if optimum.get('ended') == 'time' else 'did not settle'}"]
+
+
+def shortest_link(data: Dataset) -> list[str]:
+    """Say that no limit kept the optimum from links of very different lengths; nothing where they are alike."""
+    family = data.study.family
+    ratio = sizes(family).get(LINK_RATIO.name)
+    if ratio is None or data.optimum is None:
+        return []
+    design = np.array([[value_of(data.optimum, name) for name in family.parameter_names]])
+    value = float(ratio.values(family, design)[0])
+    words = f"the shortest link of the optimum has {number(value, 2)} of the length of its longest, which nobody builds"
+    return [f"{words}: a limit such as link_ratio = {{ min = 0.1 }} excludes that"] if value < SLIGHTEST else []
 
 
 def share_words(share: float, wanted_yield: float | None, ended: str, agree: int = 1) -> str:
@@ -192,7 +213,8 @@ def _sweep_sentences(data: Dataset, scanned: Scan) -> list[str]:
 def search_warnings(data: Dataset) -> list[str]:
     """Return warnings about the optimum; the optimiser's own statements are in `searched`."""
     survey, front = data.survey, data.front_steps
-    words = [] if survey is None else [*_unconfirmed(data), *survey.shortcomings]
+    words = shortest_link(data)
+    words += [] if survey is None else [*_unconfirmed(data), *survey.shortcomings]
     if survey is not None and survey.doubts and not _is_proven(data):
         of = "population" if survey.populations else "start"
         rare = {1: f"only one {of} reached this optimum", 2: f"only two {of}s reached this optimum"}.get(survey.best)

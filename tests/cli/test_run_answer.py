@@ -13,13 +13,14 @@ import pytest
 from click.testing import CliRunner
 
 from sweep.cli import main
-from sweep.cli.ending import held_back
+from sweep.cli.ending import ending, held_back
 from sweep.quantities.limits import Limit
 from sweep.report.answer import share_words
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.tables import limit_state
 from tests.optimise.test_study import STUDY
+from tests.support.report_dataset import write_dataset
 
 
 def run(folder: Path, text: str) -> tuple[int, str]:
@@ -96,6 +97,15 @@ def test_links_that_cannot_meet_are_named_by_the_design_that_comes_nearest(tmp_p
     assert code == 4 and "no design keeps all limits" in said
     line = next(x for x in said.splitlines() if "links that cannot meet at any crank angle" in x)
     assert "b = 150, c = 90, e = 300" in line and float(line.rpartition("the margin is ")[2].split()[0]) < 0.0
+
+
+def test_an_optimum_that_nobody_builds_or_that_did_not_settle_is_warned_of(tmp_path: Path) -> None:
+    told = "\n".join(ending(write_dataset(tmp_path / "built", optimum={"a1": 18.0})).lines)
+    assert "shortest link" not in told and "settle" not in told
+    # A crank of 0.01 mm at a coupler of 90 mm.
+    told = "\n".join(ending(write_dataset(tmp_path / "tiny", optimum={"a1": 0.01, "kkt_residual": 1e-3})).lines)
+    assert "warning: the optimiser did not settle" in told
+    assert "warning: the shortest link of the optimum has 0.00011 of the length of its longest" in told
 
 
 def test_sweep_without_optimiser_and_without_survivors_names_the_nearest_miss(tmp_path: Path) -> None:

@@ -140,6 +140,7 @@ def test_figures_depend_on_the_data_only(full: Path, tmp_path: Path) -> None:
         ({"max_abs_d2s": 11.0}, "10 % more than the reference design"),
         ({"max_abs_d2s": 11.0}, "Worse than in the reference: largest acceleration"),
         ({"a1": 30.0}, "On the edge of the space that was searched: a1 (upper edge, 30 mm)"),
+        ({"a1": 0.01}, "The shortest link of the optimum has 0.00011 of the length of its longest"),
     ],
 )
 def test_answer_admits_what_was_not_reached(tmp_path: Path, changes: dict[str, float], words: str) -> None:
