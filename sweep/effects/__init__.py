@@ -243,10 +243,10 @@ def asks_speed(names: Iterable[str]) -> bool:
 
 
 def _check_even(machine: Machine, found: Mapping[str, Family]) -> None:
-    """Raise if a member that another one drives has an effect that needs its speed: its crank turns unevenly."""
+    """Raise if a member that another one drives has an effect of an even crank or one that needs its speed."""
     for m in machine.members:
         added = found[m.name].parameter_names[len(m.family.parameter_names) :]
-        if m.driver is not None and asks_speed(added):
+        if m.driver is not None and (asks_speed(added) or "shaking_estimate" in found[m.name].pose_output):
             allowed = (
                 f"geometry alone, as {'.'.join(m.driver)} drives it unevenly: make one chain of both for its forces"
             )

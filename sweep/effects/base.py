@@ -115,8 +115,9 @@ class Effect:
     (:func:`sweep.effects.wanted.expanded`). ``tree`` is the tree of links of the only family with this effect, if any;
     ``carried_at`` is the place of a tool that a family must have, if any. ``only_for`` maps an input to the outputs
     that need it, if not all do: it is no input where none of these is wanted. ``bends`` are the kinks of outputs'
-    curves. ``advise`` is the rule of negligibility: ``advise(scene)`` applies it to some designs over a turn and
-    returns None if none of them turns.
+    curves. ``rates`` maps a quantity to its derivative by the crank angle, see
+    :class:`~sweep.families.capabilities.Rates`. ``advise`` is the rule of negligibility: ``advise(scene)`` applies it
+    to some designs over a turn and returns None if none of them turns.
     """
 
     key: str
@@ -144,6 +145,7 @@ class Effect:
     carried_at: int | None = None
     only_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     bends: tuple[Bends, ...] = ()
+    rates: Mapping[str, str] = field(default_factory=dict)
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
         """List the inputs for a family, with those of a tool if the family has a place for one."""
@@ -235,6 +237,12 @@ class PlacedEffect:
         names = [o.name for o in (*self.entry.outputs, *self.entry.design_outputs)]
         found = {f"{name}{self.number}": name for name in names}
         return found | {name: name for name in names if self._stands_alone(name)}
+
+    @property
+    def rates(self) -> dict[str, str]:
+        """Derivatives by the crank angle among the outputs, under all their names."""
+        of = {high: low for low, high in self.entry.rates.items()}
+        return {name.replace(own, of[own]): name for name, own in self.own.items() if own in of}
 
     def _numbered(self, outputs: tuple[Output, ...]) -> tuple[Output, ...]:
         if not self.number:

@@ -18,7 +18,7 @@ from kernels.types import Status
 from sweep.effects.base import PlacedEffect
 from sweep.effects.scene import Scene, first_scene, take_over
 from sweep.families.base import Accuracy, Angles, Array, Columns, Family, Output, Parameter, Step
-from sweep.families.capabilities import ThreadPath
+from sweep.families.capabilities import Rates, ThreadPath
 from sweep.families.curve_features import Bends, Crossing, Singular, of_order, of_table
 from sweep.families.poses import blocks, differenced
 from sweep.numerics.curves import Curve, TableCurve
@@ -211,7 +211,8 @@ def _finger_sine(added: Added, stage: int, column: int, designs: Array, angles: 
 def features(added: Added, effects: tuple[PlacedEffect, ...], feeling: Feeling) -> list[object]:
     """Kinks, waves and singularities that effects and loads add to curves."""
     pierced = piercing(added.family, added.inputs, feeling)
-    return [*paces(added.curves, feeling), *pierced, *bends(added, effects), *fingers(added, feeling)]
+    rates = Rates({low: high for placed in effects for low, high in placed.rates.items()})
+    return [*paces(added.curves, feeling), *pierced, *bends(added, effects), *fingers(added, feeling), rates]
 
 
 def _column(column: int, designs: Array) -> Array:

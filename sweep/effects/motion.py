@@ -52,17 +52,32 @@ OUTPUTS = _EULER + tuple(
     for axis in "xyz"
 )
 
+# Derivative of each quantity by the crank angle; no output is the turn about an axis.
+RATES = {
+    low.format(axis=axis): high.format(axis=axis)
+    for low, high in (("{axis}_p", "d{axis}_p"), ("d{axis}_p", "d2{axis}_p"), ("turn_{axis}", "omega_{axis}"),
+                      ("omega_{axis}", "eps_{axis}"))
+    for axis in "xyz"
+}  # fmt: skip
 _POINT = ("x_point", "y_point", "z_point")
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
-    """Compute the wanted components; a group of three takes as long as one component."""
+    """Compute the wanted components, in a chain with respect to stage 1; three take as long as one."""
     status = scene.status()
     groups = [[name.format(axis=axis) for axis in "xyz"] for name, _, _ in _GROUPS.values()]
-    out = [None if wanted.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
+    needed = wanted if scene.rates is None else wanted | {low for low, high in RATES.items() if high in wanted}
+    out = [None if needed.isdisjoint(names) else np.empty((*scene.shape, 3)) for names in groups]
     angles = None if wanted.isdisjoint(o.name for o in _EULER) else np.empty((*scene.shape, 2))
     motion = CouplerMotion(*(*out, angles))
     coupler_point(*scene.records, scene.table(_POINT), scene.inputs["finger"], status, motion)
+    if scene.rates is not None:
+        first, second = (rate[:, :, None] for rate in scene.rates)
+        for once, twice in ((motion.velocity, motion.acceleration), (motion.omega, motion.eps)):
+            if twice is not None and once is not None:
+                twice[:] = twice * first**2 + once * second
+            if once is not None:
+                once *= first
     columns: Columns = {
         name: values[:, :, k]
         for names, values in zip(groups, out, strict=True)
@@ -100,6 +115,7 @@ EFFECT = Effect(
     formulas=FORMULAS,
     inputs=INPUTS,
     outputs=OUTPUTS,
+    rates=RATES,
     compute=compute,
     called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
     negligible="coupler mass below 5 % of the rocker's inertia over c^2 (of the slider's mass), and balanced",

@@ -59,6 +59,13 @@ class JointRecords:
 
 
 @dataclass(frozen=True)
+class Rates:
+    """Derivatives of effects by the crank angle: ``of`` maps a quantity, not always an output, to its derivative."""
+
+    of: Mapping[str, str]
+
+
+@dataclass(frozen=True)
 class PressureEllipse:
     """Curve of the coupler direction across the follower's motion, (n, 7), for its extrema in closed form."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,7 @@ import numpy as np
 from kernels.types import Array
 from sweep.errors import InputError, known_keys
 from sweep.families.base import Family, Parameter
+from sweep.families.capabilities import Rates
 from sweep.families.frames import Frame, crank_axis, place_parameters, stage_frames, tilted
 from sweep.families.shafts import Mount
 from sweep.families.sites import AXES, EYE, TIP, Site, sites_of
@@ -217,7 +218,13 @@ class Member:
     @cached_property
     def derivatives(self) -> frozenset[str]:
         """Pose outputs that are derivatives with respect to the crank angle."""
-        return frozenset(self.family.derivative_of.values())
+        return frozenset(self.geared.derivative_of.values())
+
+    @cached_property
+    def geared(self) -> Family:
+        """The family with the rates of effects among its derivatives."""
+        rates = {low: high for found in self.family.every(Rates) for low, high in found.of.items()}
+        return replace(self.family, derivative_of={**self.family.derivative_of, **rates}) if rates else self.family
 
     @cached_property
     def sites(self) -> Mapping[str, Site]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -168,6 +170,34 @@ def test_friction_and_speed_of_a_chain():
     alone = sweep.summarise("rssr", single, ["unevenness"])
     assert uneven["status"][0] == st.OK
     assert uneven["unevenness1"][0] != pytest.approx(alone["unevenness"][0], rel=0.01)
+
+
+POINT = {"x_point": 30.0, "y_point": 7.0}
+TWO = numbered(1, RSSR) | numbered(2, GUIDE, POINT)
+DRIVEN = sweep.machine({"n": {"family": "rssr"}, "m": {"family": "guide", "driver": "n.psi"}})
+BEHIND = {
+    "two stages": (["rssr", "guide"], TWO, ""),
+    "three stages": (["rssr", "rssr", "guide"], numbered(1, RSSR) | numbered(2, RSSR) | numbered(3, GUIDE, POINT), ""),
+    "ratio": (sweep.machine({"m": {"family": "guide", "ratio": -2}}), GUIDE | POINT, "m."),
+    "two stages with a ratio": (sweep.machine({"m": {"family": ["rssr", "guide"], "ratio": 3}}), TWO, "m."),
+    "driven": (DRIVEN, GUIDE | POINT, "m."),
+}
+
+
+@pytest.mark.parametrize("case", BEHIND)
+def test_rates_of_a_coupler_are_with_respect_to_the_first_crank_or_the_main_shaft(case):
+    mechanism, own, dot = BEHIND[case]
+    table = {f"{dot}{name}": x for name, x in own.items()}
+    table |= {f"n.{name}": x for name, x in RSSR.items()} if mechanism is DRIVEN else {}
+    ladder = ("x_p", "dx_p", "d2x_p"), ("y_p", "dy_p", "d2y_p"), ("omega_z", "eps_z")
+    names = [f"{dot}{name}" for steps in ladder for name in steps]
+    poses = sweep.evaluate(mechanism, table, names, phi=PHI)
+    assert (poses["status"] == st.OK).all()
+    for low, high in itertools.chain.from_iterable(map(itertools.pairwise, ladder)):
+        slope = derivative(poses[f"{dot}{low}"].to_numpy())
+        np.testing.assert_allclose(poses[f"{dot}{high}"], slope, atol=1e-9 * np.abs(slope).max(), err_msg=high)
+    for name in names:
+        np.testing.assert_array_equal(sweep.evaluate(mechanism, table, [name], phi=PHI)[name], poses[name])
 
 
 def test_a_chain_asks_for_the_bodies_of_the_later_stages():

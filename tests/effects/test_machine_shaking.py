@@ -180,6 +180,6 @@ def test_a_stage_counts_once_and_a_driven_member_no_forces():
     with pytest.raises(sweep.InputError, match="drives it unevenly"):
         sweep.evaluate(driven, {}, ["s"], phi=PHI)
     chain = sweep.machine({"x": "rssr", "y": {"chain": ["rssr", "guide"], "driver": "x.psi"}})
-    for output in ("y.force_b1", "y.max_abs_drive_torque1", "y.shaking_force2", "y.tool_load2"):
+    for output in ("y.force_b1", "y.max_abs_drive_torque1", "y.shaking_force2", "y.tool_load2", "y.shaking_estimate2"):
         with pytest.raises(sweep.InputError, match="drives it unevenly"):
             sweep.summarise(chain, {}, [output])

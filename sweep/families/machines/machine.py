@@ -245,7 +245,7 @@ def _of_member(m: Member, own: frozenset[str]) -> _OfMember:
     motion = {name for name in own if name in m.family.pose_output}
     motion |= {x for name in placed for x in m.sites[name].made_of}
     motion |= {x for name in moving for x in m.sites[name].rates}
-    motion |= {name for derivative in motion for name in m.family.orders(derivative)}
+    motion |= {name for derivative in motion for name in m.geared.orders(derivative)}
     return _OfMember(m, own, frozenset(motion), tuple(sorted(placed)), moving)
 
 
@@ -267,7 +267,7 @@ def _driving(member: Member, own: frozenset[str]) -> set[str]:
     """Names of the driver's outputs that a member needs: its angle, and derivatives for the member's outputs."""
     if member.driver is None or not own:
         return set()
-    most = max((len(member.family.orders(name)) for name in _of_member(member, own).motion), default=0)
+    most = max((len(member.geared.orders(name)) for name in _of_member(member, own).motion), default=0)
     return set(member.driving(most))
 
 
@@ -318,9 +318,9 @@ def _with_respect_to_shaft(m: Member, result: dict[str, Any], found: Mapping[str
     """Convert derivatives by the member's crank angle to those by the main shaft's angle, in place."""
     if m.driver is None and m.ratio == 1:
         return
-    tops = [name for name in result if name in m.derivatives and m.family.derivative_of.get(name) not in result]
+    tops = [name for name in result if name in m.derivatives and m.geared.derivative_of.get(name) not in result]
     for top in tops:
-        names = m.family.orders(top)
+        names = m.geared.orders(top)
         if m.driver is None:
             for order, name in enumerate(names, start=1):
                 result[name] = result[name] * float(m.ratio) ** order
