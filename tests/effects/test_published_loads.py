@@ -1,4 +1,4 @@
-"""Loads of textbooks and of Modelica: four-bar of Norton, quick return, free-running engines, ball bearings by ISO 281.
+"""Loads of textbooks, papers and programs: joint forces, friction, free-running engines, ball bearings by ISO 281.
 
 Tolerances are half a unit of the last printed digit.
 """
@@ -187,3 +187,73 @@ def test_friction_of_an_eccentric_drive_is_that_of_bevans_friction_circles() -> 
     assert -found["drive_torque"] / 12.0 == pytest.approx(3.64, abs=0.005)
     assert -found["drive_torque_friction"] / 12.0 == pytest.approx(3.06, abs=0.005)
     assert found["drive_torque_friction"] / found["drive_torque"] == pytest.approx(0.8417, abs=5e-5)
+
+
+# Gerstmayr, EXUDYN's example of a slider-crank, reference solution by MATLAB: time, crank angle, crank speed.
+EXUDYN = [
+    (0.3025635, 1.4693723, 6.4923781),
+    (0.60219327, 5.3558174, 13.14014),
+    (0.90134647, 11.613176, 19.146027),
+    (1.2003681, 20.227787, 23.799972),
+    (1.5001275, 31.247025, 62.667853),
+    (1.8003469, 44.827631, 39.544191),
+]
+
+
+def test_slider_crank_of_exudyn_gains_the_work_of_its_torque() -> None:
+    """From rest, 0.1 N m on the crank: J omega^2/2 is 0.1 phi; crank and rod are slender, lengths in m."""
+    _, phi, speed = np.transpose(EXUDYN)
+    design = {"a": 0.1, "b": 0.3, "m_crank": 0.2, "m_coupler": 0.2, "m_slider": 0.4, "speed": 1.0}
+    inertia = sweep.evaluate("slider_crank", design, "reduced_inertia", phi=phi)["reduced_inertia"]
+    # The energy of the reference, integrated with a tolerance of 1e-6, drifts by 6e-5 of itself.
+    np.testing.assert_allclose(inertia * speed**2 / 2.0, 0.1 * phi, rtol=1e-4)
+
+
+# Cremasco Coelho, Mech. Mach. Theory 2025, 106163, equation (55) of an RSSR with friction in its shafts alone: crank
+# angle [deg], sense of the crank, torque on the crank per torque of the driven arm.
+RSSR_FRICTION = [
+    (0.0, 1.0, -0.7123763752854408),
+    (-30.0, 1.0, -0.2329015848897181),
+    (-90.0, 1.0, 0.7568274132552235),
+    (-120.0, 1.0, 1.0372138123728558),
+    (-180.0, 1.0, 0.8681117931551212),
+    (0.0, -1.0, -1.9122389879552024),
+    (-30.0, -1.0, -0.8466820431143449),
+    (-90.0, -1.0, 0.23354052012206628),
+]
+
+
+@pytest.mark.parametrize(("turn", "sense", "ratio"), RSSR_FRICTION)
+def test_friction_of_the_shafts_of_an_rssr_is_that_of_the_closed_form(turn: float, sense: float, ratio: float) -> None:
+    """Journals and collars of 5 mm, mu = 0.7 at the crank and 0.6 at the arm; links without mass.
+
+    Both shafts have their supports at his origins and 30 mm behind them, the arms lean out of their planes.
+    """
+    crank = 201.6318 * np.array([-0.379646, 0.400777, 0.833815])
+    frame = 403.1627 * np.array([0.524328, 0.835662, -0.163552])
+    axis = np.array([0.009243, -0.951003, 0.309043]) / np.linalg.norm([0.009243, -0.951003, 0.309043])
+    along, (x, y), start = axis @ crank, polar(201.6318, 7.294), 1.7072908360923371
+    foot = frame - [y, 0.0, 0.0]
+    arm = x * np.array([0.0, np.cos(start), np.sin(start)])
+    drawn = sweep.from_points(
+        "rssr", A=axis * along, axis_A=axis, B=crank, C=foot + arm, D=foot, axis_D=[1.0, 0.0, 0.0]
+    )
+    design = drawn.parameters | {"branch": drawn.branch, "speed": sense, "load_torque": 1.0}
+    design |= {"m_crank": 0.0, "m_coupler": 0.0, "m_rocker": 0.0, "mu_a": 0.7, "mu_b": 0.0, "mu_c": 0.0, "mu_d": 0.6}
+    design |= {"radius_b": 1.0, "radius_c": 1.0, "support_a1": -along, "support_a2": 30.0 - along}
+    design |= {f"{kind}_{joint}": 5.0 for joint in "ad" for kind in ("radius", "thrust_radius")}
+    design |= {"support_d1": y, "support_d2": 30.0 + y}
+    phi = drawn.phi + np.radians(turn)
+    found = sweep.evaluate("rssr", design, "drive_torque_friction", phi=phi)["drive_torque_friction"]
+    # The closed form in float64; cancellations cost it two digits.
+    assert found[0] == pytest.approx(ratio, rel=1e-13)
+
+
+def test_a_turning_load_as_large_as_a_fixed_one_has_the_mean_of_the_catalogues() -> None:
+    """SKF: F_m = f_m (F_1 + F_2), f_m = 0.75 for equal loads; exactly (4/(3 pi))^(1/3)."""
+    design = dict(family("slotted").example) | {"m_crank": 1.0, "com_crank_x": 0.1, "com_crank_z": -2.0, "speed": 10.0}
+    design |= {"support_a1": -2.0, "support_a2": -5.0, "gravity_x": 10.0, "dynamic_capacity_a": 1.0}
+    design |= {"radial_factor_a": 1.0, "axial_factor_a": 0.0, "e_limit_a": 1.0}
+    found = sweep.summarise("slotted", design, "mean_load_a1", accuracy=1e-9)["mean_load_a1"]
+    assert found[0] / 20.0 == pytest.approx((4.0 / (3.0 * np.pi)) ** (1.0 / 3.0), rel=1e-9)
+    assert round(found[0] / 20.0, 2) == 0.75

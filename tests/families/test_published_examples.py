@@ -203,7 +203,7 @@ def test_spatial_crank_rocker_turns_and_carries_as_in_adams(
 def test_quick_return_of_marghitu_and_dupac_has_the_printed_velocities_and_accelerations() -> None:
     # Advanced Dynamics, examples 5.3 at 60 deg and 5.5, 5.6 at 200 deg and 700 rev/min; lengths in m, X turned round.
     design = {"a1": 0.15, "e1": 0.3, "a2": 0.2, "b2": 0.14, "e2": 0.25, "offset2": -math.pi / 2.0}
-    want = "psi1, dpsi1, d2psi1, s, ds, d2s"
+    want = "psi1, dpsi1, d2psi1, s, ds, d2s, ds1, d2s1, omega_z2, eps_z2"
     found = sweep.evaluate("inverted_slider_crank+slider_crank", design, want, phi=np.radians([-120.0, 20.0]))
     speed = 700.0 * math.pi / 30.0
     # Half a unit of the last printed digit.
@@ -215,6 +215,36 @@ def test_quick_return_of_marghitu_and_dupac_has_the_printed_velocities_and_accel
     assert last["d2psi1"] * speed**2 == pytest.approx(7157.347, abs=5e-4)
     assert last["ds"] * speed == pytest.approx(8.383, abs=5e-4)
     assert last["d2s"] * speed**2 == pytest.approx(-1660.866, abs=5e-4)
+    # The block in its slot, which the book counts towards the pivot, and the coupler of the second dyad.
+    assert last["ds1"] * speed == pytest.approx(6.751, abs=5e-4)
+    assert last["d2s1"] * speed**2 == pytest.approx(1086.945, abs=5e-4)
+    assert last["omega_z2"] * speed == pytest.approx(25.176, abs=5e-4)
+    assert last["eps_z2"] * speed**2 == pytest.approx(882.339, abs=5e-4)
+
+
+def test_slot_beside_its_pivot_moves_as_in_norton() -> None:
+    # Design of Machinery, table P4-3 row a, open circuit: crank 2 at 30 deg, rocker 4, frame 6, slot square to the
+    # rocker; at 10 rad/s the rocker turns with -10.3 rad/s and the slip is 33.5.
+    design = {"a": 2.0, "e": 6.0, "h": -4.0}
+    found = sweep.evaluate("inverted_slider_crank", design, "psi, s, dpsi, ds", phi="30 deg").iloc[0]
+    assert math.degrees(found["psi"]) % 360.0 == pytest.approx(232.7, abs=0.05)
+    assert found["s"] == pytest.approx(1.79, abs=0.005)
+    assert (10.0 * found["dpsi"], 10.0 * found["ds"]) == pytest.approx((-10.3, 33.5), abs=0.05)
+
+
+def test_hookes_joint_of_bevan_has_the_printed_speeds() -> None:
+    # Theory of Machines, page 138: 1000 rev/min, shafts at 20 deg: 111.4 and 98.4 rad/s, at most 1370 rad/s^2.  His
+    # place of the latter is approximate, cos 2t = 2 k/(2 - k) with k = sin^2 20 deg: 41.43 deg, exactly 41.46.
+    joint = {"a": 1.0, "b": math.sqrt(2.0), "c": 1.0, "e": 0.0, "f": 0.0, "g": 0.0, "alpha": math.radians(20.0)}
+    want = "max_dpsi, min_dpsi, max_abs_d2psi, phi_max_abs_d2psi"
+    found = sweep.summarise("rssr", joint, want, accuracy=1e-10).iloc[0]
+    speed = 1000.0 * math.pi / 30.0
+    assert found["max_dpsi"] * speed == pytest.approx(111.4, abs=0.05)
+    assert found["min_dpsi"] * speed == pytest.approx(98.4, abs=0.05)
+    assert found["max_abs_d2psi"] * speed**2 == pytest.approx(1370.0, abs=0.5)
+    k = math.sin(joint["alpha"]) ** 2
+    double = (math.hypot(2.0 - k, math.sqrt(8.0) * k) - (2.0 - k)) / (2.0 * k)  # the root of the derivative
+    assert -math.cos(2.0 * found["phi_max_abs_d2psi"]) == pytest.approx(double, abs=1e-9)
 
 
 def test_linkages_of_meriam_and_kraige_have_the_printed_speeds() -> None:
