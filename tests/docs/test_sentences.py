@@ -74,7 +74,7 @@ def test_plan_says_when_a_search_ends():
 @pytest.mark.parametrize(("best", "words"), [(1, "Only one start reached"), (2, "Only two starts reached")])
 def test_an_optimum_that_few_starts_reached_asks_for_more(tmp_path, best, words):
     survey = SimpleNamespace(shortcomings=[], doubts=True, populations=0, best=best)
-    study = SimpleNamespace(tolerance=None, pareto=None)
+    study = SimpleNamespace(tolerance=None, pareto=None, family=family("backrest"))
     beside = {"study": study, "objective": None, "front": None, "front_steps": None}
     data = SimpleNamespace(survey=survey, folder=tmp_path / "designs", optimum={}, **beside)
     assert f"{words} this optimum; run more." in search_warnings(data)
