@@ -23,6 +23,7 @@ from sweep.quantities.resolve import resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import curve_of
 from sweep.reductions.margins import margin_suffixes, own_step
+from sweep.reductions.panels import has_kinks
 
 MOST_CELLS = 1000  # enclosures of one design before its proof is given up
 ORDERS = 3  # highest order of derivative that the proof covers
@@ -204,6 +205,9 @@ POSES_MEAN = 110.0
 POSES_EVENT = 340.0
 POSES_SEARCH = 180.0
 POSES_PEAK = 30.0
+# An extremum of a curve with kinks, on panels: friction and loads of bearings were measured at 1700 to 4400 poses, an
+# equivalent load at 6000 to 11000; and the panels themselves [ns].
+POSES_PANELS, PANELS_NS = 2500.0, 150_000.0
 POSES_PLACE = 240.0  # for a place after a fused search: nine precise poses take as long as this many others
 
 
@@ -264,9 +268,12 @@ def group_ns(
     # The ends of a window are found as events are.
     cuts = sum(r.windowed for r in requested) + sum(isinstance(one, WindowAngle) for one in asked)
     fused += (POSES_EVENT * pose + nanoseconds("work", "event")) * cuts
-    if quick == requested:
+    kinked = [request for request in requested - quick if has_kinks(family, request)]
+    fused += len(kinked) * (PANELS_NS + POSES_PANELS * (pose + effects))
+    smooth = len(requested - quick) - len(kinked)
+    if not smooth:
         return fused
-    peaks = (0.5 - np.log10(accuracy.target) / 16.0) * len(requested - quick)
+    peaks = (0.5 - np.log10(accuracy.target) / 16.0) * smooth
     own = nanoseconds("work", "search") + nanoseconds("work", "peak") * peaks
     return float(fused + stages * own + (POSES_SEARCH + POSES_PEAK * peaks) * (pose + effects))
 

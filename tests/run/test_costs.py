@@ -16,12 +16,15 @@ from sweep.chunks.plan import make_plan
 from sweep.effects import NAMES as EFFECTS
 from sweep.effects import effect
 from sweep.engine.estimate import estimate
+from sweep.evaluation.summaries import design_outputs
 from sweep.families import NAMES, family
 from sweep.families.base import Accuracy, Family
+from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import margin_suffixes, own_step
-from sweep.reductions.steps import own_steps, steps_of
+from sweep.reductions.steps import PANELS_NS, beyond_motion, group_ns, own_steps, pose_ns, steps_of
 from sweep.study import OutputSettings, load_study
 from tests.bench.costs import PAGE, REASONS, page
+from tests.support.frictional import frictional
 
 ROOT = Path(__file__).resolve().parents[2]
 STUDIES = sorted(path.parent for path in (ROOT / "studies").glob("*/study.toml"))
@@ -104,6 +107,29 @@ def test_rows_and_identity_of_a_dataset_do_not_depend_on_measured_times(where, f
     assert before.columns["design"].size > 100 and len(before.counts_by_status) > 1
     for column, values in before.columns.items():
         assert values.tobytes() == after.columns[column].tobytes(), column
+
+
+@pytest.mark.parametrize(
+    ("of", "name"), [("friction", "max_abs_drive_torque_friction"), ("slider_friction", "max_abs_shaft_torque_a")]
+)
+def test_an_extremum_with_kinks_is_priced_as_its_search_on_panels(of, name):
+    """The poses that a search looks at, counted, against those in its price.
+
+    A factor of three: the constant is the mean of outputs that take 1700 to 11000 poses.
+    """
+    full, _, designs = frictional(of, 20)
+    poses = [0]
+
+    def counting(designs, angles, wanted):
+        found = full.poses(designs, angles, wanted)
+        poses[0] += found["status"].size
+        return found
+
+    target = Accuracy(target=1e-8)
+    design_outputs(replace(full, poses=counting, precise_poses=None), designs, [name], target)
+    price = group_ns(full, "reductions", [name], target) - PANELS_NS
+    of_a_pose = pose_ns(full) + beyond_motion(full, resolve(full, name).of).ns
+    assert 1.0 / 3.0 < poses[0] / len(designs) / (price / of_a_pose) < 3.0
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.name)
