@@ -71,7 +71,7 @@ def init(
     if NAME.fullmatch(name) is None:
         plain = re.sub("[^a-z0-9]+", "-", name.lower()).strip("-")
         hint = f", such as {plain}" if NAME.fullmatch(plain) else ""
-        raise InputError("NAME", name, f"a plain word of a-z, 0-9 and '-'{hint}", "command line")
+        raise InputError("NAME", name, f"a plain word of a-z, 0-9 and '-', 64 letters at most{hint}", "command line")
     if points is not None and family is None:
         raise InputError("--points", str(points), "with --family: the points of one mechanism", "command line")
     if cyclogram is not None:

@@ -65,7 +65,7 @@ _EXAMPLES = {
     "rad/s": "a speed of rotation, in rpm, rad/s or deg/s",
     "s": "a time, in s, ms, min or h",
     "B": "a size, in B, MB or GB",
-    "1": "a pure number: no unit, or 1 or %",
+    "1": 'a pure number, as 0.5 or "50 %"',
 }
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
