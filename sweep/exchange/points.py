@@ -231,7 +231,8 @@ def _of_csv(file: Path, scale: float) -> tuple[Groups, bool]:
     table = _in_mm(table.rename(columns=str.strip), file, scale)
     for column in ("name", "x", "y", "z"):
         if column not in table:
-            raise MissingInput(column, "the columns name, x, y, z", str(file))
+            found = f"found {', '.join(table)}"
+            raise MissingInput(column, f"the columns name, x, y, z between commas; {found}", str(file))
     exported = {"member", "stage", "frame"} <= set(table)
     labels = [""] * len(table)
     if exported:

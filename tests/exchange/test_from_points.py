@@ -227,6 +227,8 @@ def test_verb_reads_a_table_of_points_and_writes_a_design(tmp_path):
         file.write_text(f"{head}\nA,0,0,0\nB,0,0,2 mm\n")
         done = CliRunner().invoke(main, ["points", "rssr", str(file)])
         assert done.exit_code == 2 and "row 1: z" in done.output and "'2 mm'; allowed: a number" in done.output
-    file.write_text("name,x,y\nA,0,0\n")
-    done = CliRunner().invoke(main, ["points", "rssr", str(file)])
-    assert done.exit_code == 2 and "is missing; needed: the columns name, x, y, z" in done.output
+    for head, row, found in (("name,x,y", "A,0,0", "name, x, y"), ("name;x;y;z", "A;0,5;0;0", "name;x;y;z")):
+        file.write_text(f"{head}\n{row}\n")
+        done = CliRunner().invoke(main, ["points", "rssr", str(file)])
+        words = f"is missing; needed: the columns name, x, y, z between commas; found {found}\n"
+        assert done.exit_code == 2 and words in done.output
