@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sweep.errors import StudyError
+import sweep
+from sweep.errors import InputError, StudyError
 from sweep.study import study_from_data
 
 STUDY = Path(__file__).parents[2] / "studies" / "overlock208" / "study.toml"
@@ -20,6 +21,11 @@ LEVEL = 'what it passes, in its unit, as "1 mm"; 0 if left out'
         ("relations.cast.level", {}, f"relations.cast.level = {{}}; allowed: {LEVEL}"),
         ("relations.cast.level", [1], f"relations.cast.level = [1]; allowed: {LEVEL}"),
         ("relations.a.take", ["thin", "lo"], "relations.a.take = 'lo'; allowed: tools: thin, low"),
+        (
+            "relations.foot.press",
+            "needle2",
+            "relations.foot.press = 'needle2'; allowed: a member of the family feed: feed",
+        ),
         ("relations.apart.gap", ["low", "hig"], "relations.apart.gap = 'hig'; allowed: bodies: thin, low"),
         (
             "relations.a.fields",
@@ -52,3 +58,16 @@ def test_a_fault_names_its_key_its_value_and_what_is_allowed(place, value, line)
         study_from_data(data, STUDY)
     (fault,) = error.value.faults
     assert fault.partition(": ")[2].startswith(line)
+
+
+@pytest.mark.parametrize(
+    ("relation", "allowed"),
+    [
+        ({"take": ["thin", "blade"]}, "tools: this machine has none"),
+        ({"press": "feed"}, "a member of the family feed: this machine has none"),
+    ],
+)
+def test_what_a_relation_is_about_may_be_missing_from_the_machine(relation, allowed):
+    with pytest.raises(InputError) as error:
+        sweep.machine({"needle": "guide", "looper": "rssr"}, {"one": relation})
+    assert str(error.value).endswith(f"; allowed: {allowed}")

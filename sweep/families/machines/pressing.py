@@ -16,7 +16,7 @@ from kernels.types import TWO_PI, Array, Status
 from sweep.errors import InputError, choices
 from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.capabilities import PresserFoot
-from sweep.families.machines.relations import Relation
+from sweep.families.machines.relations import NONE_HERE, Relation
 from sweep.families.names import is_place
 from sweep.families.parts import Member
 
@@ -100,7 +100,8 @@ def read_pressing(
     if len(table) != 1:
         raise InputError(name, dict(table), "press alone", where)
     if given not in members:
-        raise InputError("press", given, f"a member with a rack: {choices(str(given), members)}", where)
+        racks = choices(str(given), (m.name for m in members.values() if m.family.name == RACK))
+        raise InputError("press", given, f"a member of the family {RACK}: {racks or NONE_HERE}", where)
     m = members[given]
     if m.family.name != RACK:
         raise InputError("press", given, f"a member of the family {RACK}; {given} is of {m.family.name}", where)

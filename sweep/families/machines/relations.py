@@ -174,9 +174,12 @@ def two_names(given: tuple[str, ...], known: Sequence[str] | None, what: str, wh
     return first, second
 
 
+NONE_HERE = "this machine has none"  # of what is allowed
+
+
 def known_names(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
     """Check that a user's names are known."""
     for part in given:
         if part not in known:
-            raise InputError(what, part, f"{what}: {choices(part, known)}", where)
+            raise InputError(what, part, f"{what}: {choices(part, known) or NONE_HERE}", where)
     return given
