@@ -19,7 +19,9 @@ class StudySection(Section):
     """Table [study]."""
 
     required = ("name",)
-    name: str | None = holds("a plain word of a-z, 0-9 and '-', 64 letters at most", pattern="^[a-z0-9][a-z0-9-]*$", max_length=64)
+    name: str | None = holds(
+        "a plain word of a-z, 0-9 and '-', 64 letters at most", pattern="^[a-z0-9][a-z0-9-]*$", max_length=64
+    )
     title: str = holds("a text", "")
     question: str = holds("a text", "")
     taken: list[str] = holds("filled in: which designs come from other studies, with their hash", [])
