@@ -231,7 +231,7 @@ def _of_csv(file: Path, scale: float) -> tuple[Groups, bool]:
     table = _in_mm(table.rename(columns=str.strip), file, scale)
     for column in ("name", "x", "y", "z"):
         if column not in table:
-            found = f"found {', '.join(table)}"
+            found = f"found {', '.join(map(str, table))}"
             raise MissingInput(column, f"the columns name, x, y, z between commas; {found}", str(file))
     exported = {"member", "stage", "frame"} <= set(table)
     labels = [""] * len(table)
