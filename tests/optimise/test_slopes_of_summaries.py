@@ -70,3 +70,22 @@ def test_a_box_of_planar_members_has_the_slopes_of_all_joints_in_its_outer_plane
     # One-sided differences of second order: the square of the step remains.
     assert found["growing"][place] == pytest.approx(box[2:] @ [-1.5, 2.0, -0.5] / STEP, rel=1e-6)
     assert found["shrinking"][place] == pytest.approx(box[:3] @ [0.5, -2.0, 1.5] / STEP, rel=1e-6)
+
+
+@pytest.mark.parametrize("beside", [1e-6, -1e-6, 3e-7])
+def test_of_nearly_equal_slopes_of_a_constant_the_largest_counts_wherever_the_samples_lie(beside):
+    """z_b of a planar stage grows with alpha2 by -a2 sin(phi2), whose ends over the swing of stage 1 are nearly alike.
+
+    The lower one lay closer to a sample, and the slope was 9e-7 too small.
+    """
+    full, driver = family(["rssr", "rssr"]), family("rssr").example
+    turn = np.linspace(0.0, 2.0 * np.pi, 20001)
+    psi = sweep.evaluate("rssr", driver, ["psi"], phi=turn)["psi"].to_numpy()
+    offset = 0.5 * np.pi - 0.5 * (psi.min() + psi.max()) + beside
+    given = {f"{name}1": x for name, x in driver.items()} | {"a2": 1.0, "b2": 4.1, "c2": 3.2, "e2": 2.9}
+    found = sensitivities(full, design(full, given | {"branch2": 1.0, "offset2": offset}), ["max_z_b2"])
+    place = found["parameter"].index("alpha2")
+    slopes = -np.sin(psi + offset)
+    # The slope is refined to angles of 6e-6 rad, and the samples of psi leave 1e-9.
+    assert found["growing"][place] == pytest.approx(slopes.max(), rel=1e-8)
+    assert found["shrinking"][place] == pytest.approx(slopes.min(), rel=1e-8)

@@ -23,6 +23,7 @@ EDGE_STEP = 1e-5  # share of a variable's bounds: step of the differences betwee
 CONSTANT = 1e-9  # share of a variable's bounds: a curve that varies less than by this step is constant
 TIE = 1e-6  # share of a box: ends within this distance of the outermost count as equal
 COARSE_ANGLES, REFINEMENT = 256, 16  # angles of a turn at which slopes of a constant curve are sampled; refinement
+COARSE_TOPS = 4  # highest of them that are refined: between samples one a little lower may be the highest
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 
 # Twelve times the weights of the derivative at the first, the middle and the last of five equidistant points.
@@ -163,12 +164,15 @@ def _slope_range(curves: Curves, designs: Any, number: int) -> tuple[Array, Arra
         return np.asarray(curves.values(designs, points).imag / STEP, np.float64)
 
     def extreme(sign: float) -> Array:
-        phi = first[(sign * coarse).argmax(axis=1)]
+        measured = sign * coarse
+        local = (measured >= np.roll(measured, 1, axis=1)) & (measured >= np.roll(measured, -1, axis=1))
+        tops = np.argsort(-np.where(local, measured, -np.inf), axis=1, kind="stable")[:, :COARSE_TOPS]
+        phi = first[tops]
         for width in (step, step / REFINEMENT, step / REFINEMENT**2):
-            near = phi[:, None] + width * np.linspace(-1.0, 1.0, 2 * REFINEMENT + 1)
+            near = phi[:, :, None] + width * np.linspace(-1.0, 1.0, 2 * REFINEMENT + 1)
             fine = slopes_at(near).reshape(len(indices), *near.shape)[indices, indices]
-            phi = near[indices, (sign * fine).argmax(axis=1)]
-        return np.asarray(sign * (sign * fine).max(axis=1))
+            phi = np.take_along_axis(near, (sign * fine).argmax(axis=2)[:, :, None], axis=2)[:, :, 0]
+        return np.asarray(sign * (sign * fine).max(axis=(1, 2)))
 
     first = step * np.arange(COARSE_ANGLES, dtype=np.float64)
     coarse = slopes_at(first)
