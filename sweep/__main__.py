@@ -26,7 +26,7 @@ def _flush() -> None:
             stream.flush()
 
 
-class Ending:
+class ProcessEnd:
     """The end of the process, after everything that Python calls at exit.
 
     It skips the destructors of libraries: threads of pyarrow may still hold a file, which aborts the program
@@ -54,7 +54,7 @@ def main() -> None:
     # A subcommand handles signals itself; before and after it a signal may end the process at once.
     for number in SIGNALS:
         signal.signal(number, _leave)
-    ending = Ending()
+    ending = ProcessEnd()
     atexit.register(ending)  # registered first, so called last
     # Compiling and reading create many objects that live until the end; collecting among them early is a waste.
     gc.set_threshold(NEW_OBJECTS)

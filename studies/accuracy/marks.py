@@ -21,7 +21,7 @@ from studies.accuracy.timing import seconds
 from studies.accuracy.witness import reference
 from sweep.families import family
 from sweep.families.base import Array
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 from sweep.reductions.sampling import pose_columns, turn
 
 TARGET = 1e-8
@@ -117,7 +117,7 @@ def even_reference(designs: Array) -> Array:
     angles = turn(SAMPLES)
     exact, halves = np.empty(len(designs)), np.array_split(np.arange(len(designs)), 2)
 
-    def work(rows: Index, own: Array) -> None:
+    def work(rows: Indices, own: Array) -> None:
         part = np.ascontiguousarray(designs[rows])
         least, grid, top = np.empty(len(part)), np.empty(len(part)), np.empty(len(part), np.int64)
         rssr.dense_maxima(part, angles.cos[0], angles.sin[0], least, None, grid, None, top, own)

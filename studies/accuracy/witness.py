@@ -21,7 +21,7 @@ from kernels.types import TWO_PI
 from studies.accuracy.subjects import measure
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array, Family, March
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 from sweep.reductions.sampling import on_closed_turn, pose_columns
 
 GRID, FINER = 2048, 33  # angles of the first grid over a turn, and of each narrower one around a location
@@ -38,7 +38,7 @@ KINK = 1e-3  # a peak whose height varies more between widths is a corner of the
 MARCHED = (14_400, 28_800)  # steps of a march; their difference is its error
 NOISE = 1e-3  # largest share of rounding in a second difference that still refines a location
 
-Curve: TypeAlias = Callable[[Index, Array, Array | None], Array]
+Curve: TypeAlias = Callable[[Indices, Array, Array | None], Array]
 """``curve(rows, phi, near)``: values of some designs at angles (k, m), on the turn next to ``near`` if given."""
 
 
@@ -85,7 +85,7 @@ def extreme(mechanism: Family, designs: Array, name: str, sign: int) -> Known:
     """
     wraps = mechanism.pose_output[name].wraps
 
-    def curve(rows: Index, phi: Array, near: Array | None) -> Array:
+    def curve(rows: Indices, phi: Array, near: Array | None) -> Array:
         y = pose_columns(mechanism, designs[rows], np.ascontiguousarray(phi), (name,))[0][name]
         if wraps:
             y = np.unwrap(y, axis=1) if near is None else y + TWO_PI * np.rint((near[:, None] - y) / TWO_PI)
@@ -138,7 +138,7 @@ def _sharpest(mechanism: Family, designs: Array) -> Known:
     return Known(value, error)
 
 
-def _peaks(mechanism: Family, designs: Array) -> tuple[Index, Array]:
+def _peaks(mechanism: Family, designs: Array) -> tuple[Indices, Array]:
     """Return design and location of every peak of the second differences that may be the highest, (k,) each."""
     step = TWO_PI / GRID
     phi = np.tile(np.arange(-1, GRID + 1) * step, (len(designs), 1))

@@ -17,9 +17,9 @@ from sweep.effects.load_passing import compute_friction, compute_loads
 from sweep.effects.scene import Scene
 from sweep.families.base import Columns, Output, Turn, floats
 from sweep.families.reduction import REDUCTIONS
-from sweep.numerics.panel_search import PANELS, Curves, Top, climbed, fitted, places
+from sweep.numerics.panel_search import PANELS, CurveValues, Top, climbed, fitted, places
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.records import Index, put
+from sweep.numerics.records import Indices, put
 
 NEEDED_NAMES = ("reduced_inertia", "dreduced_inertia", "drive_torque")
 NEEDED = frozenset(NEEDED_NAMES)
@@ -68,14 +68,14 @@ def balanced(scene: Scene, speed: Array, even: Array, rubs: bool, status: Status
     return np.where(settled, change, np.nan)
 
 
-class Turned(NamedTuple):
+class SteadyTurn(NamedTuple):
     """Steady state of designs on an even grid: energy and its slope, (n, N); motor torque at the mean speed, (n,)."""
 
     energy: Array
     slope: Array
     even: Array
 
-    def at(self, row: Index, phi: Array) -> Array:
+    def at(self, row: Indices, phi: Array) -> Array:
         """Energy of the designs ``row`` (k,) at angles (k, m), by cubics through the grid."""
         size = self.energy.shape[1]
         step, whole = TWO_PI / size, np.floor(phi * (size / TWO_PI))
@@ -88,11 +88,11 @@ class Turned(NamedTuple):
         return found
 
 
-def _curves(scene: Scene, turned: Turned, status: Status) -> Curves:
+def _curves(scene: Scene, turned: SteadyTurn, status: Status) -> CurveValues:
     """Acceleration of the designs of a scene as curves; jammed poses update the ``status`` (n,) in place."""
     sense, flywheel = np.sign(scene.inputs["speed"])[:, None], scene.inputs["flywheel"][:, None]
 
-    def curves(row: Index, phi: Array, middle: Array) -> Array:
+    def curves(row: Indices, phi: Array, middle: Array) -> Array:
         posed, each = scene.posed(row, phi), np.zeros(row.size, np.uint8)
         (inertia,) = floats(compute_loads(posed.even(), frozenset(NEEDED_NAMES[:1])), NEEDED_NAMES[0])
         speed = sense[row] * np.sqrt(2.0 * turned.at(row, phi) / (inertia + flywheel[row]))
@@ -121,7 +121,7 @@ def extremes(
     speed, change, even = steady
     inertia, slope = floats(compute_loads(grid.even(), frozenset(NEEDED_NAMES[:2])), *NEEDED_NAMES[:2])
     inertia = inertia + grid.inputs["flywheel"][:, None]
-    turned = Turned(0.5 * inertia * speed**2, inertia * change + 0.5 * slope * speed**2, even)
+    turned = SteadyTurn(0.5 * inertia * speed**2, inertia * change + 0.5 * slope * speed**2, even)
     # The motor's mean torque misses over a turn what the energy misses; half its share is missed by the speed.  That is
     # an estimate: a pulse shorter than a sample is missed by more.
     felt = 0.5 * (np.abs(slope) + grid.inputs["motor_slope"][:, None] / np.abs(speed))

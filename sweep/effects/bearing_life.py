@@ -24,7 +24,7 @@ from sweep.families.poses import chosen, filled_all
 from sweep.numerics.curves import TableCurve
 from sweep.numerics.events import sign_changes, with_events
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 from sweep.numerics.singularities import crowded, singularities, turn_edges
 
 FORMULAS = (
@@ -219,23 +219,25 @@ def squares(scene: Scene, shaft: BearingShaft) -> Array:
     return np.stack([np.square(load) for load in shaft.values(scene, slice(2))], axis=2)
 
 
-def _discriminant(scene: Scene, rows: Index, stage: int, name: str, which: Index, phi: Array) -> Array:
+def _discriminant(scene: Scene, rows: Indices, stage: int, name: str, which: Indices, phi: Array) -> Array:
     posed = scene.posed(rows[which], phi).stage(stage)
     return posed.family.values(posed.designs, posed.angles, name)[0]
 
 
-def _refined(scene: Scene, rows: Index, size: Array, target: float, shaft: BearingShaft) -> tuple[Array, Array, Status]:
+def _refined(
+    scene: Scene, rows: Indices, size: Array, target: float, shaft: BearingShaft
+) -> tuple[Array, Array, Status]:
     """Integrate the three integrands over the turn of some designs; return integrals, errors and status."""
     status, scene = np.zeros(rows.size, np.uint8), scene.precise()  # plain poses may be noise near a change point
     exponent = shaft.given(scene, "life_exponent")[rows]
 
-    def integrands(which: Index, origins: Index, phi: Array) -> Array:
+    def integrands(which: Indices, origins: Indices, phi: Array) -> Array:
         load, way, worst = _loads(scene.posed(rows[which], phi), shaft)
         bad = worst != st.OK
         status[which[bad]] = worst[bad]
         return np.where(bad[:, None, None], np.nan, _integrands(load, way, size[which], exponent[which]))
 
-    def switches(which: Index, phi: Array) -> Array:
+    def switches(which: Indices, phi: Array) -> Array:
         posed = scene.posed(rows[which], phi)
         return np.concatenate([_switches(posed, shaft), *_pierced(posed)], axis=2)
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.effects import loads
 from sweep.effects.base import ON_TIP, tool_place
 from sweep.effects.load_passing import INERTIAS, LOADS, behind, compute_loads, inputs_of_loads
 from sweep.effects.scene import Scene
 from sweep.families.base import Array
+from sweep.numerics.records import Mask
 
 # Units of the inputs by which a stage needs a torque.
 WEIGHING = frozenset({"mass", "line_mass", "inertia", "force", "torque"})
@@ -33,7 +33,7 @@ class DrivenSide(NamedTuple):
     bend: Array
 
 
-def _behind_weighs(scene: Scene) -> NDArray[np.bool_]:
+def _behind_weighs(scene: Scene) -> Mask:
     """Whether any later stage has a mass or a load in each design, (n,)."""
     found = np.zeros(len(scene.designs), np.bool_)
     for stage in scene.after:

@@ -11,7 +11,6 @@ from functools import partial
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.effects.coupler import DRIVING
 from kernels.types import Status
@@ -22,6 +21,7 @@ from sweep.families.capabilities import Rates, ThreadPath
 from sweep.families.curve_features import Bends, Crossing, Singular, of_order, of_table
 from sweep.families.poses import blocks, differenced
 from sweep.numerics.curves import Curve, TableCurve
+from sweep.numerics.records import Mask
 
 # Poses per block: many enough that the overhead of a block, some milliseconds, is small per pose.
 BLOCK = 32768
@@ -219,6 +219,6 @@ def _column(column: int, designs: Array) -> Array:
     return designs[:, column]
 
 
-def _is_given(column: int, designs: Array) -> NDArray[np.bool_]:
-    given: NDArray[np.bool_] = designs[:, column] != 0.0
+def _is_given(column: int, designs: Array) -> Mask:
+    given: Mask = designs[:, column] != 0.0
     return given

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.effects import link_friction, link_loads
 from kernels.linkage.bodies import SLIDE
@@ -15,7 +14,7 @@ from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT, Named, together
 from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Parameter
 from sweep.families.link_tree import LinkJoint, LinkTree
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices, Mask
 
 KINDS = {
     "shaft": link_loads.SHAFT,
@@ -145,7 +144,7 @@ def support_loads(tree: LinkTree) -> dict[str, tuple[int, int, str]]:
 
 
 @lru_cache
-def joint_table(tree: LinkTree) -> Index:
+def joint_table(tree: LinkTree) -> Indices:
     """Table of joints for the kernels, (Q, PER_JOINT)."""
     rows = [(KINDS[j.kind], j.body, tree.freedom(j), *j.lines, rod(tree, j)) for j in tree.joints]
     return np.array(rows, np.int64)
@@ -273,7 +272,7 @@ def _friction_data(scene: Scene) -> Array:
 def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Status) -> Columns:
     """Compute the wanted quantities with friction; status JAMMED where the iteration does not converge."""
     tree, shape = tree_of(scene), scene.shape
-    same: NDArray[np.bool_] = np.zeros(len(scene.designs), np.bool_)
+    same: Mask = np.zeros(len(scene.designs), np.bool_)
     for joint in tree.joints:
         same |= together(scene, joint.name) if joint.kind in SUPPORTED else False
     refuse(status, same)

@@ -24,7 +24,7 @@ from sweep.families.base import Array, Output
 from sweep.families.curve_features import Bends
 from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.outputs import kinked
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 
 _V, _OMEGA, _ALONG, _PLACE = slice(3, 6), slice(9, 12), slice(15, 18), slice(24, 27)  # of bodies.PER_BODY
 
@@ -98,7 +98,7 @@ def relative(scene: Scene, joint: LinkJoint) -> tuple[Array, Array]:
     return turn, slip
 
 
-def _rates(bodies: Array, body: Index, place: Array) -> tuple[Array, Array]:
+def _rates(bodies: Array, body: Indices, place: Array) -> tuple[Array, Array]:
     """Compute angular velocity of one body of each design and its velocity at a place, (n, m, 3); 0 for the frame."""
     every = np.take_along_axis(bodies, np.maximum(body, 0)[:, None, None, None], axis=2)[:, :, 0]
     omega = every[:, :, _OMEGA]

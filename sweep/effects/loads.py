@@ -7,13 +7,13 @@ from dataclasses import replace
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.effects.motion import CONSTRUCTION
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Family, Output, Parameter
 from sweep.families.capabilities import JointRecords
 from sweep.families.sites import AXES
+from sweep.numerics.records import Mask
 
 FRICTION_SUFFIX, FRICTION_TEXT = "_friction", ", friction included"
 GRAM = "; a gram is 1e-6"  # users tend to type kilograms
@@ -264,7 +264,7 @@ def tip_from(scene: Scene, heights: Array) -> Array:
     return place
 
 
-def together(scene: Scene, shaft: str) -> NDArray[np.bool_]:
+def together(scene: Scene, shaft: str) -> Mask:
     """Whether both supports of a shaft coincide, (n,)."""
-    same: NDArray[np.bool_] = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
+    same: Mask = scene.inputs[f"support_{shaft}1"] == scene.inputs[f"support_{shaft}2"]
     return same

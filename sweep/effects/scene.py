@@ -22,7 +22,7 @@ from sweep.families.curve_features import samples_of_waves
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices, Mask
 
 _PER_LINK = (PER_BODY, 3, PER_LINE)
 PART = 4096  # poses of bodies per block where their loads are computed design by design
@@ -38,7 +38,7 @@ class Driven(NamedTuple):
     inputs: dict[str, Array]
     curves: Mapping[str, Curve] = {}
 
-    def only(self, rows: Index) -> Driven:
+    def only(self, rows: Indices) -> Driven:
         """Select designs by index."""
         given = {name: x[rows] for name, x in self.inputs.items()}
         return Driven(self.family, self.designs[rows], self.kappa[rows], self.offset[rows], given, self.curves)
@@ -196,9 +196,9 @@ class Scene:
         return constant if curve is None else constant + curve(self._first.angles.phi)
 
     @property
-    def pierces(self) -> NDArray[np.bool_]:
+    def pierces(self) -> Mask:
         """Whether a tool of this stage or a later one pierces in a design, so that a load jumps, (n,)."""
-        found: NDArray[np.bool_] = np.zeros(len(self.designs), np.bool_)
+        found: Mask = np.zeros(len(self.designs), np.bool_)
         for inputs in (self.inputs, *(driven.inputs for driven in self.after)):
             found = found | (inputs["pierce_force"] != 0.0) if "pierce_force" in inputs else found
         return found
@@ -218,15 +218,15 @@ class Scene:
         of_loads = max((curve.samples for curve in self.every_curve), default=0.0)
         return np.where(self.pierces, np.inf, np.maximum(samples_of_waves(self.family, self.designs), of_loads))
 
-    def only(self, rows: Index) -> Scene:
+    def only(self, rows: Indices) -> Scene:
         """Select designs by index; the scene itself if these are all."""
         return self if rows.size == len(self.designs) else self._of(rows, self.angles.part(rows))
 
-    def posed(self, rows: Index, phi: Array) -> Scene:
+    def posed(self, rows: Indices, phi: Array) -> Scene:
         """Select designs by index, perhaps repeatedly, at their own crank angles (k, m)."""
         return self._of(rows, Angles.of(phi))
 
-    def _of(self, rows: Index, angles: Angles) -> Scene:
+    def _of(self, rows: Indices, angles: Angles) -> Scene:
         given, after = {name: x[rows] for name, x in self.inputs.items()}, tuple(d.only(rows) for d in self.after)
         return Scene(self.family, self.designs[rows], angles, given, after, curves=self.curves)
 
@@ -280,6 +280,6 @@ def take_over(status: Status, later: NDArray[np.generic]) -> None:
     np.copyto(status, later, where=status == st.OK)
 
 
-def refuse(status: Status, designs: NDArray[np.bool_]) -> None:
+def refuse(status: Status, designs: Mask) -> None:
     """Set the status of a mask of designs (n,) to INVALID_INPUT where it is OK, in place."""
     np.copyto(status, st.INVALID_INPUT, where=designs[:, None] & (status == st.OK))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
@@ -23,6 +22,7 @@ from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.curve_features import Switches
 from sweep.numerics.even_grids import FINER, GRIDS, LEFT, PER_LEFT, steady
+from sweep.numerics.records import Mask
 
 EQUATION = "D4 (1)-(4)"
 FORMULAS = (
@@ -102,12 +102,12 @@ def samples(grid: Scene) -> tuple[Array, Array]:
     return inertia + grid.inputs["flywheel"][:, None], 0.5 * slope * speed * speed - drive
 
 
-def _late(scene: Scene) -> NDArray[np.bool_]:
+def _late(scene: Scene) -> Mask:
     """Whether designs need finer grids than usual, because a tool pierces or a planet turns fast, (n,)."""
     return scene.least_samples > GRIDS[-1]
 
 
-def _bent(scene: Scene) -> NDArray[np.bool_]:
+def _bent(scene: Scene) -> Mask:
     """Whether designs need finer grids from the start: loads or motion have kinks, a tool pierces, a planet is fast."""
     kinks = bool(scene.every_curve) or bool(scene.family.every(Switches))
     return _late(scene) | kinks
@@ -221,7 +221,7 @@ def _settled(coarse: Scene, grid: Scene, slope: Array) -> tuple[Array, Status, S
         turning, change, code = _turning(inertia, excess - lost, mean, motor, phi)
         lost = rubbing_torque(coarse, turning, change, status)
         size = np.maximum(np.abs(excess).max(axis=1), np.abs(lost).max(axis=1))
-        moved: NDArray[np.bool_] = np.asarray(np.abs(lost - before).max(axis=1) > SETTLED * size)
+        moved: Mask = np.asarray(np.abs(lost - before).max(axis=1) > SETTLED * size)
         if not moved.any():
             break
     take_over(status, np.where(moved & (code == st.OK), st.NOT_CONVERGED, code))

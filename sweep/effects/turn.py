@@ -16,7 +16,7 @@ from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.poses import chosen
 from sweep.families.reduction import REDUCTIONS
 from sweep.numerics.even_grids import on_first_grid
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 
 RESOLVED = 1e-9
 NONE: Mapping[str, Array] = MappingProxyType({})
@@ -34,7 +34,7 @@ def on_finer_grids(
     grid that does not resolve the loads is skipped, except the last one.
     """
 
-    def on_grid(rows: Index, size: int) -> tuple[dict[str, Array], Status]:
+    def on_grid(rows: Indices, size: int) -> tuple[dict[str, Array], Status]:
         own = np.ascontiguousarray(phi[rows] if phi.shape[0] > 1 else phi)
         return solve(scene.only(rows).on_grid(size), own, size == grids[-1])
 

@@ -27,7 +27,7 @@ from sweep.quantities.resolve import event_names
 if TYPE_CHECKING:
     import pandas as pd
 
-Row = tuple[str, str, str, float, float, float]
+CyclogramRow = tuple[str, str, str, float, float, float]
 AWAY = {PLATE: ("dwell", "low", 0.0), FLIGHT: ("flight", "flies", float("nan"))}  # states of a foot off the rack
 FLIGHT_ENDS = ("loss", "land")  # of a presser foot's first flight
 COLUMNS = ("member", "kind", "name", "start", "end", "size")
@@ -92,7 +92,7 @@ def _positions(family: Family) -> Iterator[tuple[str, str]]:
     yield from ((member, name) for member, name in pairs if name in family.derivative_of)
 
 
-def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float) -> Iterator[Row]:
+def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float) -> Iterator[CyclogramRow]:
     """Yield the strokes between neighbouring extrema, and the dwells at the global minimum and maximum."""
     rate = family.derivative_of[name]
     status, (slope, values) = poses.samples([rate, name], SAMPLES)
@@ -146,7 +146,7 @@ def _pressings(family: Family) -> list[Pressing]:
     return [r for r in getattr(family, "relations", ()) if isinstance(r, Pressing)]
 
 
-def _foot_rows(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[Row]:
+def _foot_rows(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[CyclogramRow]:
     """Yield strokes, dwell and flights of a foot whose turns are alike; on the rack strokes end at extrema.
 
     On fabric its path is not known as exactly: only its flights are listed.
@@ -185,7 +185,7 @@ def event_angles(family: Family) -> dict[str, str]:
     return names | {name: f"phi_{name}" for name in feet}
 
 
-def _events(family: Family, designs: Array) -> Iterator[Row]:
+def _events(family: Family, designs: Array) -> Iterator[CyclogramRow]:
     """Yield the events and moments of the machine that occur."""
     accuracy = Accuracy(samples=SAMPLES) if isinstance(family.domain, March) else Accuracy(target=1e-9)
     for name, angle in event_angles(family).items():

@@ -91,7 +91,12 @@ def general_route(
 
 
 def _run_general(
-    family: Family, general: GeneralRoute, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Window
+    family: Family,
+    general: GeneralRoute,
+    outputs: tuple[str, ...],
+    designs: Array,
+    accuracy: Accuracy,
+    window: Window,
 ) -> Columns:
     match general:
         case "margin":

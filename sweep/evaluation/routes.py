@@ -26,7 +26,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.machines.relations import EventValue
 from sweep.families.names import error_of, is_place
 from sweep.families.parts import Member
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 from sweep.quantities.kinds import Extent, GeneralRoute, LargestLength, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
@@ -117,7 +117,7 @@ def _turning(family: Family, designs: Array, accuracy: Accuracy) -> Status:
     return results["status"].astype(np.uint8)
 
 
-def _spread(values: NDArray[np.generic], rows: Index | None, n: int) -> NDArray[np.generic]:
+def _spread(values: NDArray[np.generic], rows: Indices | None, n: int) -> NDArray[np.generic]:
     """Expand values of some rows, or of all, to a whole column; False or nan in the other rows."""
     if rows is None or rows.size == n:
         return values

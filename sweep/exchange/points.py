@@ -183,11 +183,11 @@ def _words(point: Array) -> str:
     return "[" + ", ".join(f"{x:.6g}" for x in point) + "]"
 
 
-Points: TypeAlias = dict[str, list[float]]
-Groups: TypeAlias = dict[str, Points]
+NamedPoints: TypeAlias = dict[str, list[float]]
+Groups: TypeAlias = dict[str, NamedPoints]
 
 
-def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "", unit: str = "mm") -> Points:
+def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "", unit: str = "mm") -> NamedPoints:
     """Return the points of one stage or member by name [mm].
 
     Parameters

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part, parts
@@ -17,6 +16,7 @@ from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Array, Interval, March
 from sweep.families.poses import equal_steps
+from sweep.numerics.records import Mask
 
 STEPS = 720  # steps of a march from which one pose is taken
 GAP = 0.25  # gap between two frames side by side, relative to the larger one
@@ -157,7 +157,7 @@ def exists(parts: Sequence[Part]) -> bool:
     return any(part.joints for part in parts) and bool(_assembled(parts).any())
 
 
-def _assembled(parts: Sequence[Part]) -> NDArray[np.bool_]:
+def _assembled(parts: Sequence[Part]) -> Mask:
     """Return the mask of poses in which every joint exists."""
     exists = [np.isfinite(path).all(axis=1) for part in parts for path in part.joints.values()]
     return np.asarray(np.logical_and.reduce(exists))

@@ -19,7 +19,7 @@ from sweep.quantities.limits import compared
 from sweep.report.tables import limited
 
 MOST_BINS, NOWHERE = 64, 255
-Places: TypeAlias = NDArray[np.uint8]
+BinNumbers: TypeAlias = NDArray[np.uint8]
 
 
 class RankedColumn(NamedTuple):
@@ -29,7 +29,7 @@ class RankedColumn(NamedTuple):
     low: float
     high: float
 
-    def bins(self, count: int) -> Places:
+    def bins(self, count: int) -> BinNumbers:
         """Return the number of the cell of every value, NOWHERE for a missing one."""
         share = (self.values - self.low) / (self.high - self.low)
         known = np.minimum(np.nan_to_num(share) * count, count - 1)
@@ -84,7 +84,7 @@ def cells(
     }
 
 
-def _counted(x: Places, y: Places, bins: int, design: Array) -> list[list[int]]:
+def _counted(x: BinNumbers, y: BinNumbers, bins: int, design: Array) -> list[list[int]]:
     """Return the non-empty cells as position, count and the first design, which is the best."""
     cell = np.where((x == NOWHERE) | (y == NOWHERE), bins * bins, y.astype(np.intp) * bins + x)
     count = np.bincount(cell, minlength=bins * bins)[: bins * bins]
@@ -94,7 +94,7 @@ def _counted(x: Places, y: Places, bins: int, design: Array) -> list[list[int]]:
 
 
 @lru_cache(64)
-def _places(folder: Path, merit: str, name: str, bins: int) -> Places:
+def _places(folder: Path, merit: str, name: str, bins: int) -> BinNumbers:
     return _column(folder, merit, name).bins(bins)
 
 

@@ -12,13 +12,13 @@ from functools import partial
 from typing import TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Angles, Columns, Family, Stage, floats
 from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
 from sweep.numerics.curves import PER_GAP
+from sweep.numerics.records import Mask
 
 NARROWEST = 1e-9  # angles [rad] closer than this count as one
 SAMPLES_PER_WAVE = 32.0  # of a mechanism: they resolve its order and the next fifteen multiples
@@ -90,7 +90,7 @@ class Crossing:
 
     passing: str
     level: DesignMap
-    matters: Callable[[Array], NDArray[np.bool_]]
+    matters: Callable[[Array], Mask]
     of: frozenset[str]
 
 
@@ -144,9 +144,9 @@ def switches(family: Family, designs: Array, outputs: Collection[str]) -> Array:
     return np.where(np.isfinite(angles), angles, 0.0)
 
 
-def crossed(family: Family, designs: Array, outputs: Collection[str]) -> NDArray[np.bool_]:
+def crossed(family: Family, designs: Array, outputs: Collection[str]) -> Mask:
     """Whether a design has a crossing at which one of the given pose outputs jumps, (n,)."""
-    found: NDArray[np.bool_] = np.zeros(len(designs), np.bool_)
+    found: Mask = np.zeros(len(designs), np.bool_)
     for known in about(family, Crossing, outputs):
         found = found | known.matters(designs)
     return found

@@ -10,7 +10,6 @@ from functools import partial
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.families import feed
 from kernels.families.feed import triad
@@ -27,6 +26,7 @@ from sweep.families.poses import chosen, filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, parameter, standing
+from sweep.numerics.records import Mask
 
 ROCKER = (
     Parameter("h_a", "length", "horizontal chain: crank", positive=True),
@@ -279,7 +279,7 @@ def rack_joint(number: int) -> MovingPoint:
 _SURELY = 1e-6  # relative excess of a side over the sum of the others, above rounding of a rocker pin
 
 
-def _apart(designs: Array) -> NDArray[np.bool_]:
+def _apart(designs: Array) -> Mask:
     """Whether designs cannot assemble at phi = 0: two links, rack and leads do not close from any initial guess."""
     start = Angles.of(np.zeros((1, 1)))
     leads = [at(designs, start, {})[:, 0] for at in (rocker_pin, eccentric(2).at, eccentric(3).at)]

@@ -20,7 +20,7 @@ AXES = "xyz"
 TIP = "tip"
 EYE = "eye"  # on the coupler, the link between the points b and c
 
-Vector: TypeAlias = Callable[[Array, Mapping[str, Any]], list[Any]]
+VectorFunction: TypeAlias = Callable[[Array, Mapping[str, Any]], list[Any]]
 """Coordinates x, y, z in the frame of a stage from designs of the machine and pose outputs of the member."""
 
 
@@ -38,10 +38,10 @@ class Site(NamedTuple):
 
     stage: int
     made_of: tuple[str, ...]
-    at: Vector
+    at: VectorFunction
     free: bool = False
     rates: tuple[str, ...] = ()
-    velocity: Vector | None = None
+    velocity: VectorFunction | None = None
 
 
 def sites_of(member: Member) -> dict[str, Site]:

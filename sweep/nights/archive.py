@@ -23,7 +23,7 @@ GOING = "_going-"
 _NAME = re.compile(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\dZ(\+\d{3})?")
 EVENTS, WORDS = "log.jsonl", "log.txt"
 
-State = Literal["complete", "cut", "waiting", "failed"]
+RunState = Literal["complete", "cut", "waiting", "failed"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class StudyRecord:
     ``edited`` says that the study file was edited, which is then the only change.
     """
 
-    state: State
+    state: RunState
     code: int = 0
     linked_from: str | None = None
     linked: int = 0

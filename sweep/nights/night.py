@@ -12,7 +12,7 @@ from typing import Any
 from sweep.dataset import chunk_files, files, store
 from sweep.errors import INFEASIBLE, InputError, LinksweepError, StoreError, TimeUsedUp, WorkerDied, how_many
 from sweep.nights import archive
-from sweep.nights.archive import Journal, NightRecord, State, StudyRecord
+from sweep.nights.archive import Journal, NightRecord, RunState, StudyRecord
 from sweep.nights.carry import REPORT, Carried, carry
 from sweep.nights.changes import Changes, changes, figures, slower
 from sweep.nights.page import write_page
@@ -149,7 +149,7 @@ class _Night:
             # A proof that died leaves designs and optimum complete; no feasible design is an answer, too.
             died = ended.code not in (0, INFEASIBLE, TimeUsedUp.exit_code)
             if died or not store.is_complete(target / files.DESIGNS):
-                state: State = "cut" if ended.code in CUT else "failed"
+                state: RunState = "cut" if ended.code in CUT else "failed"
                 code = ended.code if ended.code in (*TOLD, *CUT) else WorkerDied.exit_code
                 linked = (carried.night, carried.chunks)
                 return StudyRecord(state, code, *linked, seconds=ended.seconds, message=ended.message)

@@ -23,7 +23,7 @@ DIGITS = 6
 SECONDS = "time of the run"
 
 
-class Point(NamedTuple):
+class DatedFigure(NamedTuple):
     """A figure in one night; ``night`` is the index of the night among those shown."""
 
     night: int
@@ -77,7 +77,7 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
 
     with_it = [(night, record) for night, record in mine if name in record.figures]
     points = [
-        Point(order.index(night), record.figures[name], name in record.moved, f"{night}: {shown(record)}")
+        DatedFigure(order.index(night), record.figures[name], name in record.moved, f"{night}: {shown(record)}")
         for night, record in with_it
     ]
     last = with_it[-1][1]
@@ -88,14 +88,14 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
 def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
     """Return the trend of the run's time, over nights in which something was computed."""
     points = [
-        Point(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
+        DatedFigure(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
         for night, record in mine
         if record.seconds is not None
     ]
     return _drawn(SECONDS, f"{points[-1].value:.3g} s", points, len(order))
 
 
-def _drawn(name: str, value: str, points: Sequence[Point], nights: int) -> SimpleNamespace:
+def _drawn(name: str, value: str, points: Sequence[DatedFigure], nights: int) -> SimpleNamespace:
     """Place the nights on a line, the smallest value at the bottom and the largest at the top."""
     values = np.array([point.value for point in points])
     span = float(np.ptp(values))

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.effects.speed_fluctuation import Uneven, speed_fluctuation
 from kernels.status import NOT_CONVERGED
 from kernels.types import Array, Status
+from sweep.numerics.records import Indices
 
 # Odd grids: the next one is tried for designs that the previous one does not resolve.
 GRIDS = (65, 129, 257)
@@ -21,7 +21,7 @@ PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy b
 ERROR = 1e-9
 SLOWEST = 0.9  # largest ratio of the last two eighths of the harmonics: 0.87 with jumps, 0.75 with kinks
 
-Solver: TypeAlias = Callable[[NDArray[np.intp], int], tuple[dict[str, Array], Status]]
+Solver: TypeAlias = Callable[[Indices, int], tuple[dict[str, Array], Status]]
 """``solve(rows, size)``: results (k, ...) of the designs ``rows`` (k,) on a grid of that size, by name, and status."""
 
 

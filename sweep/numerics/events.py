@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI, Array
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 
 WIDER = 8.0  # ratio of successive distances: a pole beside the nearer end leaves 2.1^-k in the k-th coefficient
 SHORTEST = 1e-11  # distance of a zero [rad] below which its effect falls between two crank angles
@@ -17,11 +17,11 @@ GRID, GRIDS = 9, 26  # points of each grid about a minimum; grids that narrow a 
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 FLAT = 1e-9  # width of brackets [rad] in which a smooth function is at its minimum to rounding
 
-Functions: TypeAlias = Callable[[Index, Array], Array]
+Functions: TypeAlias = Callable[[Indices, Array], Array]
 """``f(rows, phi)``: values (k, m, q) of q functions of the designs ``rows`` (k,) at crank angles (k, m)."""
 
 
-def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
+def sign_changes(functions: Functions, angles: Array) -> tuple[Indices, Array]:
     """Find designs (k,) and crank angles (k,) in [0, 2 pi) at which one of the functions changes its sign.
 
     Parameters
@@ -57,7 +57,7 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Index, Array]:
     return rows, np.mod(found, TWO_PI)
 
 
-def zeros(function: Callable[[Index, Array], Array], low: Array, high: Array) -> Array:
+def zeros(function: Callable[[Indices, Array], Array], low: Array, high: Array) -> Array:
     """Find roots between two places each, to the rounding of the angle.
 
     Chandrupatla (1997): inverse parabolas where they are safe, else bisection, so a jump through zero is found too; it
@@ -127,7 +127,7 @@ def _inverse(x1: Array, x2: Array, x3: Array, at1: Array, at2: Array, at3: Array
     return np.where(safe & np.isfinite(share), share, 0.5)
 
 
-def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Index, Array]:
+def near_zeros(functions: Functions, angles: Array, reach: float) -> tuple[Indices, Array]:
     """Find designs (k,) and crank angles (k,) where non-negative functions nearly vanish.
 
     Parameters
@@ -171,12 +171,12 @@ def _with_neighbours(functions: Functions, angles: Array) -> tuple[Array, Array,
     return before, after, values, np.roll(values, 1, axis=1), np.roll(values, -1, axis=1)
 
 
-def _one(functions: Functions, row: Index, which: Index, phi: Array) -> Array:
+def _one(functions: Functions, row: Indices, which: Indices, phi: Array) -> Array:
     """Values (k, m) of the functions ``which`` (k,) of the designs ``row`` at crank angles (k, m)."""
     return functions(row, phi)[np.arange(row.size), :, which] if row.size else np.zeros(phi.shape)
 
 
-def with_events(edges: Array, rows: Index, phi: Array) -> Array:
+def with_events(edges: Array, rows: Indices, phi: Array) -> Array:
     """Insert further edges (k,) into the panels' edges (n, p + 1); shorter rows repeat their last edge."""
     n = len(edges)
     count = np.bincount(rows, minlength=n)

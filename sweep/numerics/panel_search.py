@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Array
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
-from sweep.numerics.records import Index, only
+from sweep.numerics.records import Indices, only
 
 PANELS = 64  # first even panels of a turn, besides cuts where a curve may bend
 TAIL = 4  # last coefficients that bound a polynomial's error; for a tent in the middle three of them nearly vanish ...
@@ -33,7 +33,7 @@ AGAIN = 8.0  # factor from that difference to the claimed error: poses may see o
 SLOPE = 2.0 * (NODES - 1) ** 2  # bound of the slope of a polynomial bounded by 1 on a panel of width 1 (Markov)
 
 
-Curves: TypeAlias = Callable[[Index, Array, Array], Array]
+CurveValues: TypeAlias = Callable[[Indices, Array, Array], Array]
 """``curves(row, phi, middle)``: values (k, m) of the curves ``row`` (k,) at angles phi (k, m).
 
 Values that wrap are those nearest to ``middle`` (k, 1).  A curve with nan among them has no maximum.
@@ -47,7 +47,7 @@ class Panels(NamedTuple):
     between the poses and the polynomial of the panel before it was halved.
     """
 
-    row: Index
+    row: Indices
     low: Array
     high: Array
     series: Array
@@ -59,14 +59,14 @@ class Panels(NamedTuple):
 class Top(NamedTuple):
     """Maxima of k panels: place [rad], value, error of the value, error of the place [rad]."""
 
-    row: Index
+    row: Indices
     phi: Array
     value: Array
     err: Array
     err_phi: Array
 
 
-def climbed(curves: Curves, panels: Panels, n: int, mode: int, target: float, locate: bool) -> tuple[Top, Array]:
+def climbed(curves: CurveValues, panels: Panels, n: int, mode: int, target: float, locate: bool) -> tuple[Top, Array]:
     """Find the maximum of every curve that has panels; also return the sizes of the curves, (n,).
 
     Parameters
@@ -109,7 +109,7 @@ def climbed(curves: Curves, panels: Panels, n: int, mode: int, target: float, lo
     return _highest(tops, n, locate * aim * size), size
 
 
-def _halved(curves: Curves, panels: Panels, mode: int) -> tuple[Panels, Array]:
+def _halved(curves: CurveValues, panels: Panels, mode: int) -> tuple[Panels, Array]:
     """Halve each panel; also return the largest difference between the new poses and the panel's polynomial."""
     middle = 0.5 * (panels.low + panels.high)
     low, high = (np.stack(ends, axis=1).ravel() for ends in ((panels.low, middle), (middle, panels.high)))
@@ -127,7 +127,7 @@ def _halved(curves: Curves, panels: Panels, mode: int) -> tuple[Panels, Array]:
     return halves._replace(peak=best, at=at, missed=miss), miss
 
 
-def _off(curves: Curves, panels: Panels, top: Top, mode: int, which: Index) -> Array:
+def _off(curves: CurveValues, panels: Panels, top: Top, mode: int, which: Indices) -> Array:
     """Difference between maxima and poses at their places: no other pose sees a kink next to an end."""
     off, place = np.zeros(top.row.size), _inside(top.phi, panels.low, panels.high)
     here = curves(top.row[which], place[which, None], panels.series[which, :1])[:, 0]
@@ -157,7 +157,7 @@ def _held(panels: Panels, before: Array, size: Array) -> Top:
     return Top(panels.row, panels.at, panels.peak, err, panels.high - panels.low + 8.0 * EPS * np.pi)
 
 
-def _beside(curves: Curves, panels: Panels, mode: int) -> Array:
+def _beside(curves: CurveValues, panels: Panels, mode: int) -> Array:
     """Smaller of the differences between the highest poses of narrow panels and the poses on either side.
 
     Beside a jump the curve is level on its higher side.  Next to a cusp it rises further where no pose can be, by as
@@ -212,7 +212,7 @@ def _inside(phi: Array, low: Array, high: Array) -> Array:
     return np.clip(phi, low + 0.25 * NARROWEST, high - 0.25 * NARROWEST)
 
 
-def fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Panels:
+def fitted(row: Indices, low: Array, high: Array, values: Array, mode: int) -> Panels:
     """Make panels with the polynomials through their poses."""
     heights, every = measured(values, mode), np.arange(row.size)
     top = heights.argmax(axis=1)
@@ -220,7 +220,7 @@ def fitted(row: Index, low: Array, high: Array, values: Array, mode: int) -> Pan
     return Panels(row, low, high, series, heights[every, top], places(low, high)[every, top], np.zeros(row.size))
 
 
-def first_of_equals(row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index) -> Index:
+def first_of_equals(row: Indices, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Indices) -> Indices:
     """Return the first of equally high peaks in the turn, for the highest peaks ``chosen`` of some rows.
 
     A symmetric motion has equally high maxima: rounding would choose another one at every accuracy.
@@ -240,7 +240,7 @@ def first_of_equals(row: Index, phi: Array, err_phi: Array, height: Array, err: 
     return first[row[chosen]]
 
 
-def _of_row(row: Index, chosen: Index) -> Index:
+def _of_row(row: Indices, chosen: Indices) -> Indices:
     """Chosen peak of each peak's row."""
     found = np.full(row.max(initial=0) + 1, chosen[0] if chosen.size else 0)
     found[row[chosen]] = chosen
@@ -248,7 +248,7 @@ def _of_row(row: Index, chosen: Index) -> Index:
 
 
 def hill(
-    row: Index, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Index, tie: Array
+    row: Indices, phi: Array, err_phi: Array, height: Array, err: Array, chosen: Indices, tie: Array
 ) -> tuple[Array, Array]:
     """Find the places of the highest maxima ``chosen`` of some rows, and their errors.
 

@@ -12,9 +12,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.types import EPS, Array
-from sweep.numerics.records import Index, Mask, only
+from sweep.numerics.records import Indices, Mask, only
 
-Integrand: TypeAlias = Callable[[Index, Index, Array], Array]
+Integrand: TypeAlias = Callable[[Indices, Indices, Array], Array]
 """``f(rows, origins, x)``: values (k, 17, q) of the curves ``rows`` (k,) at ``x`` (k, 17); ``origins`` (k,) are the
 first panels in which these lie."""
 
@@ -69,8 +69,8 @@ class Integrals(NamedTuple):
 class _Panels(NamedTuple):
     """Panels of all curves, each (k,); integrals and errors (k, q), generations of suspected noise (k, 1)."""
 
-    row: Index
-    origin: Index
+    row: Indices
+    origin: Indices
     low: Array
     high: Array
     value: Array
@@ -154,7 +154,7 @@ def _weighted(weights: Array, values: Array) -> Array:
     return total
 
 
-def _evaluated(function: Integrand, row: Index, origin: Index, low: Array, high: Array) -> _Panels:
+def _evaluated(function: Integrand, row: Indices, origin: Indices, low: Array, high: Array) -> _Panels:
     half = 0.5 * (high - low)
     x = (0.5 * (low + high))[:, None] + half[:, None] * PROBED
     every = function(row, origin, x)

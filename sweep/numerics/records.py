@@ -7,13 +7,13 @@ from typing import Any, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Index: TypeAlias = NDArray[np.intp]
+Indices: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
 
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
-def only(record: Record, which: Index | Mask) -> Record:
+def only(record: Record, which: Indices | Mask) -> Record:
     """Select rows of a named tuple of columns by index or mask."""
     return type(record)(*(column[which] for column in record))
 
@@ -23,7 +23,7 @@ def joined(*records: Record) -> Record:
     return type(records[0])(*(np.concatenate(columns) for columns in zip(*records, strict=True)))
 
 
-def put(record: tuple[Any, ...], rows: Index | Mask, values: tuple[Any, ...]) -> None:
+def put(record: tuple[Any, ...], rows: Indices | Mask, values: tuple[Any, ...]) -> None:
     """Write rows of a named tuple of columns, in place."""
     for column, part in zip(record, values, strict=True):
         column[rows] = part

@@ -12,9 +12,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI, Array
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 
-Discriminant: TypeAlias = Callable[[Index, Array], Array]
+Discriminant: TypeAlias = Callable[[Indices, Array], Array]
 """``f(rows, phi)``: values of a discriminant of the designs ``rows`` (k,) at crank angles (k, m), or (1, m) for all."""
 
 SAMPLES = 64  # samples of a discriminant, which is smooth even where the motion is nearly singular
@@ -82,7 +82,7 @@ def _elsewhere(n: int, number: int) -> tuple[Array, Array]:
     return np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1)), np.full((n, NEAREST), FAR)
 
 
-def _closer(curve: Discriminant, row: Index, phi: Array) -> tuple[Array, Array]:
+def _closer(curve: Discriminant, row: Indices, phi: Array) -> tuple[Array, Array]:
     """Refine places and distances (k,) of the zeros of designs ``row`` near dips at ``phi`` (k,)."""
     spacing = TWO_PI / SAMPLES
     every, rho, step = np.arange(phi.size), np.full(phi.size, FAR), np.full(phi.size, spacing)

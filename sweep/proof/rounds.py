@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.boxes.branching import COMBINED, OPEN
 from kernels.types import Numbers
@@ -22,13 +21,14 @@ from sweep.dataset import files
 from sweep.families.base import Array
 from sweep.jobs.executors import Executor
 from sweep.jobs.signals import Stop
+from sweep.numerics.records import Mask
 from sweep.proof.question import Question
 from sweep.study import ProveSettings
 
 UNITS = 64
 SHARES = (0.1, 0.15, 0.25, 0.5)  # shares of all boxes by round: later rounds have better bounds for choosing boxes
 OUTCOMES = ("open", "too small", "bound", "empty")  # indexed by the numbers of kernels.boxes.branching
-Tell: TypeAlias = Callable[[int, int], None]
+TellBoxes: TypeAlias = Callable[[int, int], None]
 
 
 class Leaves(NamedTuple):
@@ -43,9 +43,9 @@ class Leaves(NamedTuple):
     factors: Array
 
     @property
-    def open(self) -> NDArray[np.bool_]:
+    def open(self) -> Mask:
         """Mask of the boxes that the next round halves."""
-        mask: NDArray[np.bool_] = self.outcome == OPEN
+        mask: Mask = self.outcome == OPEN
         return mask
 
     def taken(self, which: Numbers) -> Leaves:
@@ -88,7 +88,7 @@ class Cores:
 
 
 @dataclass(frozen=True)
-class Unit:
+class RoundUnit:
     """Evaluate the boxes of one unit of a round and write its leaves."""
 
     question: Question
@@ -135,7 +135,7 @@ def _read(path: Path) -> Explored:
 
 
 def explored(
-    question: Question, target: float, settings: ProveSettings, folder: Path, cores: Cores, tell: Tell
+    question: Question, target: float, settings: ProveSettings, folder: Path, cores: Cores, tell: TellBoxes
 ) -> Explored:
     """Halve boxes until every box is proven or the allowed number of boxes was evaluated.
 
@@ -164,7 +164,7 @@ def explored(
         if cores.stop or (settings.seconds is not None and time.monotonic() - begin > settings.seconds):
             return Explored(joined([*done, todo]), judged, True, seconds)
         most = max(int(settings.boxes * share) // UNITS, 1)
-        unit = Unit(question, target, _split(todo, question), most, settings.smallest, folder, number)
+        unit = RoundUnit(question, target, _split(todo, question), most, settings.smallest, folder, number)
         counts = [_read(path).judged for path in _finished(unit)]  # of a stopped run
         missing = (k for k in range(UNITS) if not unit.path(k).is_file())
         for _, count in cores.place.outcomes(unit, missing, cores.jobs, cores.stop):
@@ -200,5 +200,5 @@ def _split(boxes: Leaves, question: Question) -> Leaves:
     return boxes
 
 
-def _finished(unit: Unit) -> list[Path]:
+def _finished(unit: RoundUnit) -> list[Path]:
     return [path for path in map(unit.path, range(UNITS)) if path.is_file()]

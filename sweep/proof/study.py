@@ -18,7 +18,7 @@ from sweep.dataset.files import metadata
 from sweep.errors import MissingInput
 from sweep.proof.certificate import Proof, concluded, read_proof, write
 from sweep.proof.question import Question, described, question_of
-from sweep.proof.rounds import SHARES, UNITS, Cores, Tell, explored
+from sweep.proof.rounds import SHARES, UNITS, Cores, TellBoxes, explored
 from sweep.study import ProveSettings, Study
 
 NEVER = 1e300  # target without a known feasible design: then only emptiness can be proven
@@ -26,7 +26,7 @@ PARTS = "_proof"  # folder of finished work units; removed when the proof has en
 EVENT = "proof"  # event in ``_runs.jsonl``
 
 
-def prove_study(study: Study, folder: str | Path, cores: Cores, tell: Tell = lambda _, __: None) -> Proof:
+def prove_study(study: Study, folder: str | Path, cores: Cores, tell: TellBoxes = lambda _, __: None) -> Proof:
     """Prove that no design of the study's space is better than its optimum by more than the wanted gap.
 
     Parameters

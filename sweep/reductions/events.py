@@ -12,7 +12,7 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Event, Family, Interval
 from sweep.families.names import error_of
 from sweep.numerics.events import zeros
-from sweep.numerics.records import Index
+from sweep.numerics.records import Indices
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
 from sweep.reductions.rounding import shaken
@@ -84,7 +84,9 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
     return phi, err, number, status
 
 
-def _crossings(family: Family, designs: Array, rows: Index, values: Array, event: Event) -> tuple[Array, Array, Array]:
+def _crossings(
+    family: Family, designs: Array, rows: Indices, values: Array, event: Event
+) -> tuple[Array, Array, Array]:
     """Count the passages of samples (r, m) in the event's sense; also the first place and its error, each (r,)."""
     off = (values - event.level) * (1.0 if event.rising else -1.0)
     passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
@@ -106,7 +108,7 @@ def _root(
 ) -> tuple[Array, Array]:
     """Find a root between two samples with the values ``low`` and ``high``, from whose slope its error follows."""
 
-    def off(which: Index, phi: Array) -> Array:
+    def off(which: Indices, phi: Array) -> Array:
         return pose_columns(family, designs[which], phi[:, None], [event.of])[0][event.of][:, 0] - event.level
 
     slope = np.abs((high - low) / (right - left))

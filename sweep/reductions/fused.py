@@ -20,7 +20,7 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.capabilities import Assembly, DesignMap, FusedOutput, InSeries, constant
 from sweep.families.chain import Chain
-from sweep.numerics.records import Index, Mask
+from sweep.numerics.records import Indices, Mask
 from sweep.quantities.kinds import Request
 from sweep.reductions.peak_search import TIE
 from sweep.reductions.refine import SHRINK, Peaks, confirmed, polished
@@ -158,7 +158,7 @@ def extrema(
 
 
 def _confirm(
-    curves: tuple[FusedCurve, ...], number: Index, modes: Index, designs: Array, found: Extremum, rows: Index,
+    curves: tuple[FusedCurve, ...], number: Indices, modes: Indices, designs: Array, found: Extremum, rows: Indices,
     tolerance: Array, spacing: Array,
 ) -> None:  # fmt: skip
     """Replace extrema that rounding may have moved too far by those of precise poses, in place.
@@ -169,11 +169,11 @@ def _confirm(
     later = [x for x in precise.every(Assembly) if x.stage and 2 <= int(x.stage) <= len(curves[0].forms)]
     poses = [curve.request.pose for curve in curves]
 
-    def evaluated(active: Index, phi: Array, beside: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
+    def evaluated(active: Indices, phi: Array, beside: Sequence[str] = ()) -> tuple[Array, dict[str, Array]]:
         columns, _ = pose_columns(precise, designs[active], phi, list(dict.fromkeys([*poses, *beside])))
         return np.choose(number[active, None], [columns[pose] for pose in poses]), columns
 
-    def precisely(active: Index, phi: Array) -> tuple[Array, Array]:
+    def precisely(active: Indices, phi: Array) -> tuple[Array, Array]:
         """Give values, and their relative change due to the rounded input angles of the later stages' precise poses."""
         values, columns = evaluated(active, phi[:, None], [loop.discriminant for loop in later])
         amplified = np.ones(active.size)
@@ -181,7 +181,7 @@ def _confirm(
             amplified += np.abs(loop.scale(designs[active]) / columns[loop.discriminant][:, 0])
         return values[:, 0], 4.0 * EPS * amplified
 
-    def sample(active: Index, phi: Array) -> Array:
+    def sample(active: Indices, phi: Array) -> Array:
         return sign[active, None] * evaluated(active, phi)[0]
 
     here, behind = precisely(np.arange(rows.size), phi)

@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels.types import TWO_PI
 from sweep.families.base import Array
-from sweep.numerics.records import Index, Mask, joined, only
+from sweep.numerics.records import Indices, Mask, joined, only
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
 
@@ -31,11 +31,11 @@ CLOSER = np.linspace(-2.25, 2.25, CROWDED.size)  # places about a maximum, in sa
 class Sampled(NamedTuple):
     """Samples of a turn: indices of the designs (n,), pose outputs (n, m) by name, and number of samples."""
 
-    rows: Index
+    rows: Indices
     columns: dict[str, Array]
     samples: int
 
-    def around(self, requests: Sequence[Request], candidates: PeakCandidates, near: Index) -> Array:
+    def around(self, requests: Sequence[Request], candidates: PeakCandidates, near: Indices) -> Array:
         """Return the samples around candidates, (k, q), at offsets ``near`` (q,) from each candidate's own sample."""
         number, row, column, _ = candidates
         found = np.empty((row.size, near.size))
@@ -45,7 +45,7 @@ class Sampled(NamedTuple):
         return found
 
 
-def doubtful(candidates: PeakCandidates, peaks: Peaks, around: Array, tolerance: Array) -> Index:
+def doubtful(candidates: PeakCandidates, peaks: Peaks, around: Array, tolerance: Array) -> Indices:
     """Select the refined peaks beside which samples may hide a higher one.
 
     Parameters
@@ -115,7 +115,7 @@ def tops_of(
     return found, Peaks(at, height, gap, np.full(look.size, np.inf), shown, gap, 0.5 * gap)
 
 
-def apart(known: tuple[PeakCandidates, Peaks], found: tuple[PeakCandidates, Peaks]) -> Index:
+def apart(known: tuple[PeakCandidates, Peaks], found: tuple[PeakCandidates, Peaks]) -> Indices:
     """Select the found peaks that differ from all known ones of the same curve: they are farther away than the gap.
 
     One maximum listed twice, with different errors, would make a tie whose place is chosen by rounding.
@@ -127,11 +127,11 @@ def apart(known: tuple[PeakCandidates, Peaks], found: tuple[PeakCandidates, Peak
     return np.flatnonzero(np.minimum(high - low[above - 1], low[above] - high) > found[1].spacing)
 
 
-def _curve(candidates: PeakCandidates, requests: int) -> Index:
+def _curve(candidates: PeakCandidates, requests: int) -> Indices:
     """Index of each candidate's curve."""
     return candidates.row * requests + candidates.request
 
 
-def _column(phi: Array, samples: int) -> Index:
+def _column(phi: Array, samples: int) -> Indices:
     """Index of the nearest sample."""
     return np.rint(phi * (samples / TWO_PI)).astype(np.int64) % samples

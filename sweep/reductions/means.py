@@ -18,7 +18,7 @@ from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.families.curve_features import Switches, about, crossed
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
-from sweep.numerics.records import Index, only
+from sweep.numerics.records import Indices, only
 from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
@@ -113,10 +113,10 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     return mean, err, status
 
 
-def _alone(family: Family, designs: Array, rows: Index, pose: str, top: Array, mean: Array, err: Array) -> Index:
+def _alone(family: Family, designs: Array, rows: Indices, pose: str, top: Array, mean: Array, err: Array) -> Indices:
     """Select rows whose curve is rounding alone: its mean never settles, and its error becomes as large as itself."""
     off = shaken_anywhere(family, designs[rows], top[rows], pose)
-    found: Index = rows[off >= ALONE * mean[rows]]
+    found: Indices = rows[off >= ALONE * mean[rows]]
     err[found] = np.maximum(err[found], np.maximum(off[off >= ALONE * mean[rows]], mean[found]))
     return found
 
@@ -155,7 +155,7 @@ def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: 
     size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
     blur = _blur(np.square(starts / size[:, None]))
 
-    def squares(rows: Index, origins: Index, phi: Array) -> Array:
+    def squares(rows: Indices, origins: Indices, phi: Array) -> Array:
         columns, codes = pose_columns(family, designs[rows], phi, [pose])
         worst = np.empty(rows.size, np.uint8)
         scan.worst_status(codes, worst)

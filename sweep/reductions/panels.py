@@ -18,8 +18,8 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Bends, Singular, Smooth, about
 from sweep.numerics.chebyshev import NODES
-from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, Curves, Top, climbed, fitted, measured, places
-from sweep.numerics.records import Index
+from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, CurveValues, Top, climbed, fitted, measured, places
+from sweep.numerics.records import Indices
 from sweep.quantities.kinds import Request
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import ALONE, PLACES, order_of, rounding_by_pieces, shaken_anywhere, singular_share
@@ -81,7 +81,7 @@ def _cut_alike(family: Family, requests: Sequence[Request]) -> list[list[Request
 
 
 def _block(
-    family: Family, designs: Array, rows: Index, target: float, found: dict[Request, Extremum], locate: bool
+    family: Family, designs: Array, rows: Indices, target: float, found: dict[Request, Extremum], locate: bool
 ) -> Status:
     """Search the curves of some designs; fill ``found`` and return their status."""
     guards = discriminants(family)
@@ -135,10 +135,10 @@ def _block(
     return status
 
 
-def _curves(family: Family, designs: Array, pose: str, status: Status) -> Curves:
+def _curves(family: Family, designs: Array, pose: str, status: Status) -> CurveValues:
     """Poses of the designs as curves; poses without a value set the ``status`` (n,) of their design, in place."""
 
-    def curves(row: Index, phi: Array, middle: Array) -> Array:
+    def curves(row: Indices, phi: Array, middle: Array) -> Array:
         found = np.empty(phi.shape)
         for some in blocks(np.arange(row.size), phi.shape[1]):
             poses, each = pose_columns(family, designs[row[some]], phi[some], [pose])
@@ -161,7 +161,7 @@ def _vanish(family: Family, designs: Array, pose: str, top: Top, size: Array) ->
     top.phi[at], top.value[at], top.err[at], top.err_phi[at] = first[top.row[at]], 0.0, 0.0, NARROWEST
 
 
-def _cut(family: Family, designs: Array, output: str) -> tuple[Index, Array, Array]:
+def _cut(family: Family, designs: Array, output: str) -> tuple[Indices, Array, Array]:
     """Design index and ends of the first panels for curves of a pose output."""
     edges = ends(family, designs, PANELS, PANELS * NODES, output)
     low, high = edges[:, :-1], edges[:, 1:]

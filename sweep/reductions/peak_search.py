@@ -12,7 +12,7 @@ from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, Switches, about, switches
 from sweep.numerics.panel_search import first_of_equals
-from sweep.numerics.records import Index, Mask, joined, only, put
+from sweep.numerics.records import Indices, Mask, joined, only, put
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine, rounding
@@ -58,7 +58,7 @@ class PeakSearch:
     window: Window | None
     found: dict[Request, Extremum] = field(init=False)
     status: Status = field(init=False)
-    undone: Index = field(init=False)
+    undone: Indices = field(init=False)
     names: list[str] = field(init=False)
     guards: list[str] = field(init=False)
     near: Singularities | None = field(init=False)
@@ -86,16 +86,16 @@ class PeakSearch:
             self.torn[np.ix_([not request.windowed for request in self.requests], steep)] = True
             self.undone[self.torn] = 0
 
-    def needed(self, rows: Index) -> Index:
+    def needed(self, rows: Indices) -> Indices:
         """Smallest number of samples that a request of these designs still needs, 0 where all are found."""
         left = np.where(self.undone[:, rows] > 0, self.undone[:, rows], NEVER).min(axis=0, initial=NEVER)
         return np.where(left < NEVER, left, 0)
 
-    def places(self, number: Index) -> Mask:
+    def places(self, number: Indices) -> Mask:
         """Whether the crank angles of these requests are wanted."""
         return np.array([self.locate or request.place for request in self.requests], np.bool_)[number]
 
-    def block(self, rows: Index, samples: int) -> None:
+    def block(self, rows: Indices, samples: int) -> None:
         """Sample some designs, and refine those that the samples resolve."""
         columns, worst, winds = sample_turn(self.family, self.designs[rows], samples, self.names)
         if self.anywhere:
@@ -131,8 +131,8 @@ class PeakSearch:
         self.undone[:, rows] = np.where(looked, now, self.undone[:, rows])
 
     def _candidates(
-        self, rows: Index, columns: dict[str, Array], samples: int
-    ) -> tuple[PeakCandidates, Array, Index, Mask]:
+        self, rows: Indices, columns: dict[str, Array], samples: int
+    ) -> tuple[PeakCandidates, Array, Indices, Mask]:
         """Return candidates, sizes of the curves, samples needed, and which curves are constants, noise or jump."""
         needed, pieces = np.full((len(self.requests), rows.size), START), []
         scales, alone = np.empty(needed.shape), np.zeros(needed.shape, np.bool_)
@@ -163,7 +163,7 @@ class PeakSearch:
         joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
         return PeakCandidates(*joined), scales, needed, alone
 
-    def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Index:
+    def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Indices:
         distance = np.full(count, np.inf)
         for name in self.guards:
             one, largest = np.empty(count), columns[name].max(axis=1)
@@ -171,7 +171,7 @@ class PeakSearch:
             distance = np.where(rounding.tells(largest), np.minimum(distance, one), distance)
         # Coarse samples show a near zero only roughly: at most eight times as many samples at once.
         wanted = np.minimum(PER_SINGULARITY / np.maximum(distance, 1e-300), 8.0 * samples)
-        samples_needed: Index = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
+        samples_needed: Indices = np.exp2(np.ceil(np.log2(np.maximum(wanted, 1.0)))).astype(np.int64)
         return samples_needed
 
     def _refine(
@@ -241,7 +241,7 @@ class PeakSearch:
 
     def _rivals(
         self, turn: Sampled, candidates: PeakCandidates, peaks: Peaks, size: Array
-    ) -> tuple[Index, Array, Mask]:
+    ) -> tuple[Indices, Array, Mask]:
         """Select the peaks that may be the highest; their tolerances, and whether a place depends on which one is."""
         number = candidates.request
         windowed = np.array([request.windowed for request in self.requests])[number]  # those outside are dropped later
@@ -264,7 +264,7 @@ class PeakSearch:
         if middle is None:
             middle = turn.around(self.requests, candidates, np.zeros(1, np.intp))[:, 0]
 
-        def sample(active: Index, phi: Array) -> Array:
+        def sample(active: Indices, phi: Array) -> Array:
             designs = turn.rows[row[active]]
             poses, status = pose_columns(family, self.designs[designs], phi, self.names)
             if not self.anywhere:
@@ -285,14 +285,14 @@ class PeakSearch:
         given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
         return rounding.rounding_share(self.family, *given, guards, self._orders(candidates))
 
-    def _orders(self, candidates: PeakCandidates) -> Index:
+    def _orders(self, candidates: PeakCandidates) -> Indices:
         """Order of derivative of each candidate; a discriminant rounds like a position."""
         orders = [0 if self.anywhere else rounding.order_of(self.family, r.pose) for r in self.requests]
         return np.array(orders)[candidates.request]
 
     def _within_window(
-        self, rows: Index, columns: dict[str, Array], request: Request, row: Index, peaks: Peaks, resolved: Mask
-    ) -> tuple[Index, Peaks]:
+        self, rows: Indices, columns: dict[str, Array], request: Request, row: Indices, peaks: Peaks, resolved: Mask
+    ) -> tuple[Indices, Peaks]:
         """Drop the peaks outside the window, and add its edges as candidates."""
         assert self.window is not None
         poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
@@ -304,7 +304,7 @@ class PeakSearch:
         added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
         return np.concatenate([row[inside], edge.row]), joined(only(peaks, inside), added)
 
-    def _keep_best(self, rows: Index, request: Request, row: Index, peaks: Peaks) -> Array:
+    def _keep_best(self, rows: Indices, request: Request, row: Indices, peaks: Peaks) -> Array:
         """Store the highest candidate of each row; return its distance from the first guess (0 where none)."""
         best, which = np.full(rows.size, -np.inf), np.full(rows.size, -1)
         scan.best_candidate(row, peaks.height, best, which)

@@ -10,10 +10,10 @@ import numpy as np
 from kernels.curves import samples as scan
 from kernels.types import EPS
 from sweep.families.base import Array, Family
-from sweep.numerics.records import Index, Mask, only, put
+from sweep.numerics.records import Indices, Mask, only, put
 from sweep.reductions.sampling import pose_columns
 
-Sampler: TypeAlias = Callable[[Index, Array], Array]
+Sampler: TypeAlias = Callable[[Indices, Array], Array]
 """``sample(candidates, phi)``: values (k, m), times their signs, of candidates (k,) at the angles phi (k, m)."""
 
 OFFSETS = np.arange(-2.0, 3.0)
@@ -38,9 +38,9 @@ VARIES = 8.0  # ratio of the rounding at neighbouring poses to that at one pose,
 class PeakCandidates(NamedTuple):
     """Samples next to a possible extremum, each (k,): request, row of the block, column, sign to make it a maximum."""
 
-    request: Index
-    row: Index
-    column: Index
+    request: Indices
+    row: Indices
+    column: Indices
     sign: Array
 
     @classmethod
@@ -184,7 +184,7 @@ def confirmed(
     return peaks
 
 
-def attained(sample: Sampler, peaks: Peaks, which: Index) -> Peaks:
+def attained(sample: Sampler, peaks: Peaks, which: Indices) -> Peaks:
     """Evaluate the heights at the places themselves, where the slope and the effect of a rounded angle vanish."""
     return reaching(sample(which, peaks.phi[:, None])[:, 0], peaks)
 
@@ -230,7 +230,7 @@ def polished(family: Family, designs: Array, slope: str, phi: Array, err_phi: Ar
     """
     precise = family.precise()
 
-    def sample(active: Index, angles: Array) -> Array:
+    def sample(active: Indices, angles: Array) -> Array:
         return pose_columns(precise, designs[active], angles, [slope])[0][slope]
 
     return polish_places(sample, phi, err_phi)

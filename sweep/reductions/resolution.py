@@ -20,7 +20,7 @@ from sweep.families import curve_features as features
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import Bends, SingularCurve
 from sweep.numerics.events import near_zeros, sign_changes, with_events
-from sweep.numerics.records import Index, Mask, only, put
+from sweep.numerics.records import Indices, Mask, only, put
 from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Discriminant, Singularities, crowded, singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, blocks, pose_columns, sample_turn
@@ -63,7 +63,7 @@ def nearest(family: Family, designs: Array, outputs: Collection[str], within: fl
     """
     curves = features.singular_curves(family.precise(), outputs)
 
-    def of_rows(some: Index, curve: SingularCurve) -> Discriminant:
+    def of_rows(some: Indices, curve: SingularCurve) -> Discriminant:
         return lambda rows, phi: curve(designs[some[rows]], Angles.of(phi))
 
     parts = [
@@ -120,7 +120,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     return edges
 
 
-def events(family: Family, designs: Array, looks: int, outputs: Collection[str]) -> tuple[Index, Array]:
+def events(family: Family, designs: Array, looks: int, outputs: Collection[str]) -> tuple[Indices, Array]:
     """Find designs (k,) and angles (k,) where a pose output passes its level, a follower reverses, or a curve bends.
 
     The roots are searched between ``looks`` even samples of the turn, as far as ``outputs`` depend on them.
@@ -135,23 +135,23 @@ def events(family: Family, designs: Array, looks: int, outputs: Collection[str])
     return rows, phi
 
 
-def zeros(family: Family, designs: Array, output: str) -> tuple[Index, Array]:
+def zeros(family: Family, designs: Array, output: str) -> tuple[Indices, Array]:
     """Find designs (k,) and angles (k,) where a non-negative pose output is known to vanish, or jumps."""
     looked = _looked(len(designs), BENDING, np.zeros(0, np.intp), np.zeros((0, 0)))
     found = [_bent(bent, designs, looked) for bent in features.about(family, Bends, (output,)) if bent.zero]
     return found[0] if found else (np.zeros(0, np.intp), np.zeros(0))
 
 
-def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Index, Array]:
+def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Indices, Array]:
     """Find designs and angles where functions pass zero at which curves bend, bracketed by the angles ``looked``."""
 
-    def bending(rows: Index, phi: Array) -> Array:
+    def bending(rows: Indices, phi: Array) -> Array:
         return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
 
     return near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked)
 
 
-def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Index, Array]:
+def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Indices, Array]:
     """Find designs and angles where an output passes its level or a speed passes zero, bracketed by ``looked``."""
     passed_levels = features.about(family, features.Crossing, outputs)
     # Reversals affect friction and loads, which belong to effects; a family knows its own kinks.
@@ -160,7 +160,7 @@ def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Ar
         return np.zeros(0, np.intp), np.zeros(0)
     names = list(dict.fromkeys([*speeds, *(crossing.passing for crossing in passed_levels)]))
 
-    def functions(rows: Index, phi: Array) -> Array:
+    def functions(rows: Indices, phi: Array) -> Array:
         columns, _ = pose_columns(family, designs[rows], phi, names)
         passed = [columns[crossing.passing] - crossing.level(designs[rows])[:, None] for crossing in passed_levels]
         return np.nan_to_num(np.stack([*(columns[name] for name in speeds), *passed], axis=2))
@@ -168,7 +168,7 @@ def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Ar
     return sign_changes(functions, looked)
 
 
-def _looked(n: int, even: int, close: Index, angles: Array) -> Array:
+def _looked(n: int, even: int, close: Indices, angles: Array) -> Array:
     """Even angles of a turn, (n, m), with further angles of the designs ``close``."""
     looked = np.tile(np.arange(even) * (TWO_PI / even), (n, 1))
     return with_events(looked, np.repeat(close, angles.shape[1]), angles.ravel())
@@ -191,7 +191,7 @@ DOUBT = 3.0  # factor on the truncation error that the decay of the coefficients
 class Turns(NamedTuple):
     """Designs whose samples resolve a curve: indices (r,), values (r, q, N), coefficients, error and size, (r,)."""
 
-    rows: Index
+    rows: Indices
     values: Array
     series: NDArray[np.complex128]
     err: Array
@@ -235,7 +235,7 @@ class FourierCurve:
             yield from self._doubled(np.flatnonzero(fewest == first), int(first), designs, target, status, mean)
 
     def _doubled(
-        self, rows: Index, samples: int, designs: Array, target: float, status: Status, mean: bool
+        self, rows: Indices, samples: int, designs: Array, target: float, status: Status, mean: bool
     ) -> Iterator[Turns]:
         """Yield resolved designs, beginning with ``samples`` samples and doubling them for the others."""
         known = np.empty((rows.size, len(self.parts), 0))

@@ -11,7 +11,7 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
-from sweep.numerics.records import Index, Mask, only
+from sweep.numerics.records import Indices, Mask, only
 from sweep.numerics.singularities import Singularities, crowded
 from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
 from sweep.reductions.resolution import nearest
@@ -41,8 +41,8 @@ def measure_constants(values: Array, scale: Array, rough: Array) -> Mask:
 
 
 def rounding_share(
-    family: Family, designs: Array, columns: dict[str, Array], row: Index, column: Index, guards: list[str],
-    order: Index,
+    family: Family, designs: Array, columns: dict[str, Array], row: Indices, column: Indices, guards: list[str],
+    order: Indices,
 ) -> Array:  # fmt: skip
     """Estimate the share of values that rounding may have changed (docs/internals/extrema.md).
 
@@ -68,7 +68,7 @@ def rounding_share(
     return _of_order(order, amplified)
 
 
-def rounding_by_pieces(guards: dict[str, Array], row: Index, of: Index) -> Array:
+def rounding_by_pieces(guards: dict[str, Array], row: Indices, of: Indices) -> Array:
     """Bound the share of values that rounding near a dead point may have changed.
 
     Parameters
@@ -85,7 +85,7 @@ def rounding_by_pieces(guards: dict[str, Array], row: Index, of: Index) -> Array
     return 4.0 * EPS * (1.0 + amplified)
 
 
-def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
+def singular_share(near: Singularities, phi: Array, order: Indices) -> Array:
     """Estimate the rounding near singularities that no discriminant of an assembly shows.
 
     The rounded quantity falls with the square of the distance of its complex zero.
@@ -98,7 +98,7 @@ def singular_share(near: Singularities, phi: Array, order: Index) -> Array:
     return _of_order(order, np.maximum(near.distance(phi) ** -2.0 - 1.0, 0.0))
 
 
-def _of_order(order: Index, amplified: Array) -> Array:
+def _of_order(order: Indices, amplified: Array) -> Array:
     """Share of rounding: a derivative of order n grows like the power 1/2 - n of the vanishing quantity."""
     return 4.0 * EPS * np.where(order == 0, np.sqrt(amplified), np.where(order < 3, amplified, 2.0 * amplified))
 
@@ -229,7 +229,7 @@ def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target
     """
     precise = family.precise()
 
-    def measured(which: Index, angles: Array, name: str = pose) -> Array:
+    def measured(which: Indices, angles: Array, name: str = pose) -> Array:
         found = pose_columns(precise, designs[which], angles, [name])[0][name]
         return np.abs(found) if name == pose else found
 

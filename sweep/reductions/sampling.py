@@ -14,7 +14,7 @@ from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
 from sweep.families.base import Angles, Array, Columns, Family, Interval, PoseFunction, of_family
 from sweep.families.capabilities import Assembly
-from sweep.numerics.records import Index, Mask
+from sweep.numerics.records import Indices, Mask
 
 BLOCK = 2**17  # samples handled at once: a few columns of this length stay in the cache
 UNCLEAR = 0.25  # step of an angle between two poses [turns] from which on it may have gone the other way round
@@ -29,7 +29,7 @@ def turn(samples: int, between: bool = False) -> Angles:
     return Angles.of(phi)
 
 
-def blocks(rows: Index, samples: int, columns: int = 1) -> Iterator[Index]:
+def blocks(rows: Indices, samples: int, columns: int = 1) -> Iterator[Indices]:
     """Yield pieces of ``rows`` so small that their samples of ``columns`` columns stay in the cache."""
     size = max(1, BLOCK * FEW // (samples * max(columns, FEW)))
     for start in range(0, rows.size, size):
@@ -77,7 +77,7 @@ def continued(family: Family, name: str, values: Array, middle: Array) -> Array:
     return values + TWO_PI * np.rint((middle - values) / TWO_PI)
 
 
-def unwrapped(row: Index, values: Array) -> tuple[Array, Mask]:
+def unwrapped(row: Indices, values: Array) -> tuple[Array, Mask]:
     """Make angles continuous over the turn, from poses (k, m) on pieces of it in rising order.
 
     Returns
@@ -158,7 +158,7 @@ DESIGN_STATUS[st.NOT_ASSEMBLED] = st.NOT_ROTATABLE
 DESIGN_STATUS[st.DEAD_POINT] = st.UNDECIDABLE
 
 
-def worst_of_pieces(row: Index, each: Status, n: int) -> Status:
+def worst_of_pieces(row: Indices, each: Status, n: int) -> Status:
     """Worst status of the turn of each of n designs, from poses (k, m) on pieces of the turns of ``row`` (k,)."""
     first = np.searchsorted(row, np.arange(n))
     count = np.bincount(row, minlength=n)

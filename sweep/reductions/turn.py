@@ -12,7 +12,7 @@ from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
 from sweep.errors import MissingInput
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.numerics.records import Index, Mask
+from sweep.numerics.records import Indices, Mask
 from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
 from sweep.quantities.resolve import STAY, resolve
 from sweep.reductions.extrema import true_extrema
@@ -153,9 +153,9 @@ def sampled_extrema(
 
 
 def _best_samples(
-    family: Family, rows: Index, columns: dict[str, Array], request: Request, samples: int, window: Window | None,
+    family: Family, rows: Indices, columns: dict[str, Array], request: Request, samples: int, window: Window | None,
     found: Extremum,
-) -> Index:  # fmt: skip
+) -> Indices:  # fmt: skip
     """Write the extreme sample of designs and its crank angle; return the designs without a sample in the window."""
     allowed = None
     if window is not None and request.windowed:

@@ -10,7 +10,7 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
 from sweep.numerics.events import zeros
-from sweep.numerics.records import Index, Mask
+from sweep.numerics.records import Indices, Mask
 from sweep.reductions.resolution import denser
 from sweep.reductions.sampling import blocks, pose_columns, sample_turn
 
@@ -33,22 +33,22 @@ class Window(NamedTuple):
         high = least + part[1] * (most - least) if part[1] < 1.0 else np.full(least.size, np.inf)
         return cls(low, high, err, position)
 
-    def only(self, rows: Index | Mask) -> Window:
+    def only(self, rows: Indices | Mask) -> Window:
         """Select designs by index or mask."""
         return Window(self.low[rows], self.high[rows], self.err[rows], self.position)
 
-    def holds(self, rows: Index, positions: Array) -> Mask:
+    def holds(self, rows: Indices, positions: Array) -> Mask:
         """Whether the positions (k, m) of the designs ``rows`` (k,) lie in the window."""
         return (positions >= self.low[rows, None]) & (positions <= self.high[rows, None])
 
-    def nears(self, rows: Index, positions: Array) -> Mask:
+    def nears(self, rows: Indices, positions: Array) -> Mask:
         """Whether the motion is in the window at samples (k, m) of a turn, or between a sample and its neighbour."""
         after = np.roll(positions, -1, axis=1)
         low, high = np.minimum(positions, after), np.maximum(positions, after)
         passed = (high >= self.low[rows, None]) & (low <= self.high[rows, None])
         return passed | np.roll(passed, 1, axis=1)
 
-    def grazed(self, rows: Index, positions: Array) -> Mask:
+    def grazed(self, rows: Indices, positions: Array) -> Mask:
         """Whether the motion may pass a limit of the window twice between two samples."""
         doubtful = np.zeros(rows.size, np.bool_)
         for level in (self.low[rows], self.high[rows]):
@@ -62,14 +62,14 @@ class Edges(NamedTuple):
     ``side`` is 0 at the lower limit of the window, 1 at the upper one.
     """
 
-    row: Index
+    row: Indices
     phi: Array
     values: Array
     err: Array
-    side: Index
+    side: Indices
 
 
-def edges(family: Family, designs: Array, rows: Index, window: Window, columns: dict[str, Array], pose: str) -> Edges:
+def edges(family: Family, designs: Array, rows: Indices, window: Window, columns: dict[str, Array], pose: str) -> Edges:
     """Find where the follower enters or leaves the window, and a pose output there.
 
     Parameters
@@ -89,7 +89,7 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
     level = np.where(side == 0, window.low[rows[row]], window.high[rows[row]])
     size = np.abs(positions).max(axis=1)[row]
 
-    def at(which: Index, phi: Array, of: Family = family) -> tuple[Array, Array]:
+    def at(which: Indices, phi: Array, of: Family = family) -> tuple[Array, Array]:
         poses, _ = pose_columns(of, designs[rows[row[which]]], phi, (window.position, pose))
         off = poses[window.position] - level[which, None]
         return poses[pose], off - TWO_PI * np.round(off / TWO_PI) if wraps else off
@@ -107,7 +107,7 @@ def edges(family: Family, designs: Array, rows: Index, window: Window, columns: 
     return Edges(row, phi, exact, err, side)
 
 
-def _brackets(rows: Index, window: Window, positions: Array) -> tuple[Index, Index, Index]:
+def _brackets(rows: Indices, window: Window, positions: Array) -> tuple[Indices, Indices, Indices]:
     """Find row, sample before it and side of each crossing."""
     row, column = np.empty(positions.size, np.int64), np.empty(positions.size, np.int64)
     found = []

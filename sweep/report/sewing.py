@@ -15,6 +15,7 @@ from sweep.evaluation.thread.diagram import diagram
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.sewing import RPM, Sewing
 from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
+from sweep.numerics.records import Mask
 from sweep.report.dataset import Dataset
 from sweep.report.figures import LIMIT, WIDTH, new_figure
 from sweep.report.made import toleranced
@@ -23,9 +24,7 @@ from sweep.report.quantities import number
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
-    Mask = NDArray[np.bool_]
 
 CURVE = 33  # number of speeds of the curve
 ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the rounding of its search

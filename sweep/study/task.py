@@ -63,7 +63,7 @@ def _is_number(raw: object) -> TypeGuard[float]:
     return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100
 
 
-Bounds = dict[str, Annotated[tuple[float, float], _range("mm")]]
+LengthBounds = dict[str, Annotated[tuple[float, float], _range("mm")]]
 
 
 def load_task(path: str | Path) -> SynthesisTask:
@@ -175,7 +175,7 @@ def _key(kind: str, name: str) -> tuple[Any, str]:
     if name == "bearings":
         return _inputs(name, extended(family("rssr"), BEARINGS).parameters), "a table with inputs of the bearings"
     if name == "bounds":
-        return Bounds, 'a table of { from = ..., to = ..., unit = "mm" }'
+        return LengthBounds, 'a table of { from = ..., to = ..., unit = "mm" }'
     if name.endswith("_range"):
         words = f'{{ from = ..., to = ..., unit = "{unit}" }}: {units.example(unit)}'
         return Annotated[tuple[float, float], _range(unit)], words

@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import synthesis as kernels
 from kernels.synthesis import acceptance
@@ -24,6 +23,7 @@ from sweep.errors import InputError, nearest
 from sweep.evaluation.tables import Table, design_matrix, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Array, Columns, Parameter
+from sweep.numerics.records import Mask
 
 ARC_ENDS = 8
 
@@ -99,7 +99,7 @@ class Locus:
         columns |= results
         return LocusSolutions(designs, status, failed, columns["phi1"], columns["start"], columns["phi0"])
 
-    def _ranges(self, matrix: Array) -> list[tuple[str, str, NDArray[np.bool_]]]:
+    def _ranges(self, matrix: Array) -> list[tuple[str, str, Mask]]:
         columns = dict(zip(self.parameter_names, matrix.T, strict=True))
         ranges = []
         if "swing" in columns:

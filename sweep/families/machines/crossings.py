@@ -20,7 +20,7 @@ from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 from sweep.families.machines.relations import Relation
 from sweep.numerics.events import bottoms, zeros
-from sweep.numerics.records import Index, Mask, only
+from sweep.numerics.records import Indices, Mask, only
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -37,7 +37,7 @@ Places: TypeAlias = dict[str, Any]
 class CrankAngles(NamedTuple):
     """Crank angles of several designs, with the row of the design of each."""
 
-    row: Index
+    row: Indices
     phi: Array
 
 
@@ -222,7 +222,7 @@ class Poses:
             status[row] = st.NOT_CONVERGED
         return status, found
 
-    def _root(self, row: Index, left: Array, right: Array, name: str, values: Array, level: float = 0.0) -> Array:
+    def _root(self, row: Indices, left: Array, right: Array, name: str, values: Array, level: float = 0.0) -> Array:
         """Find a root in each bracket where an output passes a level.
 
         It is computed on polynomials through samples (n, m), then corrected by one step on poses; where that step is
@@ -247,7 +247,7 @@ class Poses:
             better[rest] = zeros(lambda k, phi: self.near(some[k], phi, name) - level, left[rest], right[rest])
         return np.asarray(better, np.float64)
 
-    def least(self, row: Index, start: Array, end: Array, name: str, samples: int = 64) -> Array:
+    def least(self, row: Indices, start: Array, end: Array, name: str, samples: int = 64) -> Array:
         """Find where an output is smallest between two angles of each design, (k,)."""
         if not row.size:
             return np.zeros(0)
@@ -270,7 +270,7 @@ class Poses:
         return place
 
 
-def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, Index]:
+def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, Indices]:
     """Return each angle, sorted by design, the next angle of its design around the turn, and the index of that."""
     row, phi = ordered.row, ordered.phi
     first = np.searchsorted(row, row)
@@ -279,7 +279,7 @@ def _neighbours(ordered: CrankAngles) -> tuple[Array, Array, Index]:
     return phi, phi[after] + np.where(last, TWO_PI, 0.0), after
 
 
-def largest(row: Index, values: Array, n: int) -> Array:
+def largest(row: Indices, values: Array, n: int) -> Array:
     """Largest value of each design; nan for designs without one."""
     most = np.full(n, -np.inf)
     np.maximum.at(most, row, values)
@@ -292,7 +292,7 @@ def where_largest(found: CrankAngles, values: Array, n: int) -> Array:
     return scattered(n, found.row[order], found.phi[order])
 
 
-def scattered(n: int, row: Index, values: Array) -> Array:
+def scattered(n: int, row: Indices, values: Array) -> Array:
     """Expand values of some designs to all; nan for the others."""
     column = np.full(n, np.nan)
     column[row] = values

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.effects.speed_fluctuation import RESOLVED
@@ -21,6 +20,7 @@ from sweep.families.curve_features import Smooth, least_samples
 from sweep.families.machines.relations import Relation
 from sweep.families.poses import chosen
 from sweep.numerics.even_grids import FINER, GRIDS, LEFT, on_first_grid, steady
+from sweep.numerics.records import Indices
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -147,7 +147,7 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
     speed = designs[:, names.index(first.named("speed"))] / first.ratio
     slope = designs[:, names.index(f"{shaft.name}_motor_slope")]
 
-    def on_grid(rows: NDArray[np.intp], size: int) -> tuple[dict[str, Array], Status]:
+    def on_grid(rows: Indices, size: int) -> tuple[dict[str, Array], Status]:
         inertia, excess, poses = _samples(shaft, machine, designs[rows], speed[rows], size)
         motor = slope[rows] if slope[rows].any() else None
         coarsest = LEFT if size == FINER[-1] else RESOLVED

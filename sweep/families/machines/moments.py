@@ -21,7 +21,7 @@ from sweep.families.machines.segments import Gap, cross, dot, minus
 from sweep.families.machines.thread_way import turned as turned_back
 from sweep.families.machines.tools import Blade, Needle, rate_of
 from sweep.families.sites import AXES
-from sweep.numerics.records import Index, only
+from sweep.numerics.records import Indices, only
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -311,7 +311,7 @@ def _last(stops: crossings.CrankAngles, depth: Array, size: Array, phi: Array) -
     return found
 
 
-def _following(roots: crossings.CrankAngles, taken: Index) -> Index:
+def _following(roots: crossings.CrankAngles, taken: Indices) -> Indices:
     """Index of the next passage of the same design, around the turn."""
     after = taken + 1
     same = np.append(roots.row, -1)[after] == roots.row[taken]

@@ -93,7 +93,7 @@ def _foot(v: Point, d: Point) -> Any:
 
 
 @dataclass(frozen=True)
-class Body:
+class Capsule:
     """A segment with a radius.
 
     ``ends`` are dotted names of two points, or of a point and a direction along which both ends lie at distances
@@ -123,7 +123,7 @@ class Body:
 class Gap(Relation):
     """Distance of two bodies, less their radii."""
 
-    bodies: tuple[Body, Body]
+    bodies: tuple[Capsule, Capsule]
 
     @property
     def outputs(self) -> tuple[Output, ...]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import EPS, TWO_PI, Array, Status
@@ -22,6 +21,7 @@ from sweep.families.machines.relations import Relation, with_size
 from sweep.families.machines.segments import cross
 from sweep.families.sites import AXES
 from sweep.numerics.even_grids import on_first_grid
+from sweep.numerics.records import Indices, Mask
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -164,7 +164,7 @@ class Shaking(Relation):
             asked = [o.name for o in self.numbers if o.name in wanted]
             least = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked])
 
-            def on_grid(rows: NDArray[np.intp], samples: int) -> tuple[dict[str, Array], Status]:
+            def on_grid(rows: Indices, samples: int) -> tuple[dict[str, Array], Status]:
                 codes, amplitudes = _amplitudes(machine, designs[rows], asked, samples)
                 found: dict[str, Array] = {}
                 for name, (value, err, size) in amplitudes.items():
@@ -199,7 +199,7 @@ def refused(
     if not isinstance(relation, Shaking | ShaftTorque):
         return {}
     listed = {one.member for one in (relation.stages if isinstance(relation, Shaking) else relation.driven)}
-    unfit: NDArray[np.bool_] = np.zeros((len(designs), 1), np.bool_)
+    unfit: Mask = np.zeros((len(designs), 1), np.bool_)
     for key in ("speed", "speed_change"):
         ratios = {f"{m.name}.{key}{m.family.stages[0].tail}": m.ratio for m in machine.members if m.name in listed}
         shaft = [designs[:, [k]].real / ratios[p] for k, p in enumerate(machine.parameter_names) if p in ratios]

@@ -11,7 +11,7 @@ from sweep.errors import InputError, MissingInput, choices, known_keys, number, 
 from sweep.families.base import PER_RADIAN, Output
 from sweep.families.capabilities import OutputLink
 from sweep.families.machines.relations import Relation, two_names
-from sweep.families.machines.segments import Body, Gap, dot, minus
+from sweep.families.machines.segments import Capsule, Gap, dot, minus
 from sweep.families.parts import Member, vector
 from sweep.families.sites import AXES, links_of
 
@@ -88,10 +88,10 @@ class Needle:
     point: float
 
     @property
-    def body(self) -> Body:
+    def body(self) -> Capsule:
         """Capsule of the needle from its top to its point."""
         reach = (self.sense * self.top, self.sense * self.point)
-        return Body(self.name, (self.on, self.line), reach, 0.5 * self.diameter)
+        return Capsule(self.name, (self.on, self.line), reach, 0.5 * self.diameter)
 
     @property
     def working(self) -> Spot:
@@ -119,9 +119,9 @@ class Blade:
     hold: str = ""
 
     @property
-    def body(self) -> Body:
+    def body(self) -> Capsule:
         """Capsule of the blade from its tip to its back end."""
-        return Body(self.name, (self.tip, self.back), None, self.radius)
+        return Capsule(self.name, (self.tip, self.back), None, self.radius)
 
     @property
     def working(self) -> Spot:
@@ -297,12 +297,12 @@ def length(key: str, value: object, where: str, what: str = "a length") -> float
     return found
 
 
-def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Body]:
+def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str, Capsule]:
     """Return the bodies between which gaps are defined: tools by name, links by "member.link"."""
     found = {name: tool.body for name, tool in tools.items() if isinstance(tool, Needle | Blade)}
     for m in members.values():
         for link, (first, second) in links_of(m).items():
-            found[f"{m.name}.{link}"] = Body(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))
+            found[f"{m.name}.{link}"] = Capsule(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))
     return found
 
 

@@ -9,20 +9,20 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.families.base import Angles, Array
 from sweep.families.poses import differentiable
+from sweep.numerics.records import Indices
 from sweep.optimise.extrema.scanned import (
     CROSSING,
     EDGE,
     PASSING,
     STATIC,
     STATIONARY,
-    Row,
+    PointRow,
     bending,
     discriminant_scale,
     distances,
@@ -38,8 +38,6 @@ from sweep.optimise.extrema.scanned import (
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.measures import Series, curve
 from sweep.reductions.sampling import on_closed_turn
-
-Index: TypeAlias = NDArray[np.intp]
 
 STEP = 1e-30  # imaginary step: the error is of order STEP^2, without cancellation
 NEIGHBOUR = 3e-5  # distance of the slopes whose difference gives the curvature, used only in Newton's steps [rad]
@@ -58,10 +56,10 @@ class Points:
     ``curvature`` are its derivatives by phi; ``position_slope`` is the slope of the position.
     """
 
-    series: Index
+    series: Indices
     phi: Array
     sense: Array
-    kind: Index
+    kind: Indices
     level: Array
     value: Array
     slope: Array
@@ -80,7 +78,7 @@ class Points:
         return replace(self, phi=self.phi + offset)
 
     @classmethod
-    def of(cls, rows: Iterable[Row]) -> Points:
+    def of(cls, rows: Iterable[PointRow]) -> Points:
         """Return points from rows (series, phi, sense, how, level, value)."""
         table = np.array(list(rows), dtype=np.float64).reshape(-1, 6)
         zeros = np.zeros(len(table))
@@ -108,7 +106,7 @@ class Curves:
         # For each series the number of the position that defines its window; -1 without a window.
         numbers = {s: n for n, s in enumerate(series) if s in followers}
         numbers |= {s: numbers[p] for s, p in zip((s for s in series if s.window is not None), followers, strict=True)}
-        self.position: Index = np.array([numbers.get(s, -1) for s in series], np.intp)
+        self.position: Indices = np.array([numbers.get(s, -1) for s in series], np.intp)
         names = {s.output for s in series} | {s.pressure for s in series if s.pressure}
         self.wanted = frozenset(names)
         self.with_angles = with_angles
@@ -136,7 +134,7 @@ class Curves:
         phi: Array = np.arange(samples, dtype=np.float64) * (2.0 * math.pi / samples)
         columns = self.poses(design[None, :], phi)
         turns = not columns["status"].any()
-        rows: list[Row] = []
+        rows: list[PointRow] = []
         windowed = [n for n, s in enumerate(self.series) if s.window is not None]
         for n, s in enumerate(self.series):
             if s.passes is not None:
@@ -150,7 +148,7 @@ class Curves:
         if self.may_bend and turns:
             points = self._with_edges(design, columns, initial, points, 2.0 * math.pi / samples)
         if windowed and turns:
-            edge_rows: list[Row] = []
+            edge_rows: list[PointRow] = []
             for n in windowed:
                 edge_rows += self._in_window(n, design, phi, columns, points)
             points = self.follow(design, Points.joined(points, Points.of(edge_rows)), stride=2.0 * math.pi / samples)
@@ -274,7 +272,7 @@ class Curves:
         return points.phi
 
     def _derivatives(
-        self, design: Array, phi: Array, points: Points, by_series: list[tuple[Series, Index]]
+        self, design: Array, phi: Array, points: Points, by_series: list[tuple[Series, Indices]]
     ) -> tuple[Array, Array, Array, Array, Array]:
         """Return slope and curvature of each output, slope and value of its position, and its value, (K,) each."""
         angles = np.concatenate([phi - NEIGHBOUR, phi, phi + NEIGHBOUR])
@@ -302,7 +300,7 @@ class Curves:
                 target = position[low] + points.level[edges] * (position[high] - position[low])
                 move[edges] = -(position[edges] - target) / position_slope[edges]
 
-    def _in_window(self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points) -> list[Row]:
+    def _in_window(self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points) -> list[PointRow]:
         """Return the extrema inside the window of series n, and both senses at every crossing of the window's edges."""
         series = self.series[n]
         low, high = self.stroke(points, n)

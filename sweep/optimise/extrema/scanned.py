@@ -8,11 +8,11 @@ from collections.abc import Collection, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.types import TWO_PI
 from sweep.families.base import Array, Family, Interval
 from sweep.families.curve_features import Crossing, Singular, Switches, Waves, about, crossed, switches
+from sweep.numerics.records import Indices, Mask
 from sweep.reductions.resolution import FEWEST, denser, events
 
 if TYPE_CHECKING:
@@ -21,12 +21,10 @@ if TYPE_CHECKING:
 # Kinds of points: an extremum that approaches a level is stationary, PASSING is a passage of the level.
 STATIONARY, CROSSING, STATIC, PASSING, EDGE = range(5)
 
-Row: TypeAlias = tuple[int, float, float, int, float, float]
+PointRow: TypeAlias = tuple[int, float, float, int, float, float]
 
 
-def extrema(
-    n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: NDArray[np.bool_] | None = None
-) -> list[Row]:
+def extrema(n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: Mask | None = None) -> list[PointRow]:
     """Return the maxima (sense +1) or minima (-1) of a curve."""
     if not np.isfinite(x).all():
         return []
@@ -48,7 +46,7 @@ def extrema(
     return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
 
 
-def edge_extrema(n: int, phi: Array, edge: Array, values: Array, curve: Array) -> list[Row]:
+def edge_extrema(n: int, phi: Array, edge: Array, values: Array, curve: Array) -> list[PointRow]:
     """Return points at the higher side of every edge as maxima and at the lower side as minima.
 
     Their level is the number of the edge, negative for a point before it.
@@ -64,7 +62,7 @@ def edge_extrema(n: int, phi: Array, edge: Array, values: Array, curve: Array) -
         return []
     heights = np.concatenate([curve, values.ravel()])
     middle = 0.5 * (float(heights.max()) + float(heights.min()))
-    rows: list[Row] = []
+    rows: list[PointRow] = []
     for sense in (1.0, -1.0):
         side = np.argmax(sense * values, axis=0)
         for k, x in enumerate(np.take_along_axis(values, side[None, :], axis=0)[0].tolist()):
@@ -73,7 +71,7 @@ def edge_extrema(n: int, phi: Array, edge: Array, values: Array, curve: Array) -
     return rows
 
 
-def passages(n: int, phi: Array, x: Array, level: float, sense: float) -> list[Row]:
+def passages(n: int, phi: Array, x: Array, level: float, sense: float) -> list[PointRow]:
     """Find where samples over the turn pass the level in the given sense, and where they only approach it.
 
     Rows are those of :meth:`sweep.optimise.extrema.points.Points.of`.  The extrema that approach the level without
@@ -89,7 +87,7 @@ def passages(n: int, phi: Array, x: Array, level: float, sense: float) -> list[R
     return passing + [(n, float(phi[j]), sense, STATIONARY, level, float(x[j])) for j in approaching]
 
 
-def first_passage(phi: Array, kind: NDArray[np.intp], candidates: Sequence[int]) -> tuple[int | None, list[int]]:
+def first_passage(phi: Array, kind: Indices, candidates: Sequence[int]) -> tuple[int | None, list[int]]:
     """Return the point at which a curve first passes its level in [0, 2 pi).
 
     Points before it that only approach the level are returned, too.
@@ -182,7 +180,7 @@ def distances(edges: Array, phi: Array) -> Array:
     return np.asarray(np.abs(_arc(phi, edges[:, None])).min(axis=0, initial=math.pi), np.float64)
 
 
-def overtopped(points: Points, at_edges: Points, stride: float) -> NDArray[np.bool_]:
+def overtopped(points: Points, at_edges: Points, stride: float) -> Mask:
     """Tell which points have an edge at least as high within a stride; Newton's steps towards a kink end beside it."""
     mask = np.zeros(len(points), np.bool_)
     for k in range(len(at_edges)):

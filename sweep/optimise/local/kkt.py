@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
 from sweep.families.base import Array
+from sweep.numerics.records import Mask
 from sweep.optimise.local.least_squares import non_negative
 from sweep.optimise.problem.rows import Form, Label
 
@@ -36,7 +36,7 @@ class Multipliers:
 
     weights: Array
     bounds: Array
-    at_bound: NDArray[np.bool_]
+    at_bound: Mask
     residual: float
 
 

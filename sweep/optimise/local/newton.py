@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.optimise.extrema.points import Index
+from sweep.numerics.records import Indices
 from sweep.optimise.local.kkt import ACTIVE, EDGE, Multipliers, multipliers
 from sweep.optimise.local.least_squares import LEAST_CURVATURE, least_squares, quadratic_step, row_and_null_space
 from sweep.optimise.local.model import FEASIBLE, Model, State
@@ -82,7 +82,9 @@ def _violation(form: Form, rows: Array) -> float:
     return float(np.maximum(np.where(form.equal, np.abs(rows), -rows), 0.0).max(initial=0.0))
 
 
-def hessian(model: Model, base: State, form: Form, duals: Multipliers, free: Index, both_sides: bool = False) -> Array:
+def hessian(
+    model: Model, base: State, form: Form, duals: Multipliers, free: Indices, both_sides: bool = False
+) -> Array:
     """Return the second derivatives of the Lagrangian by the free variables, from differences of exact gradients.
 
     With ``both_sides`` they are accurate to 1e-8 instead of 1e-5, for twice as many evaluations: the curvature along a

@@ -41,7 +41,7 @@ CHECKED_STARTS = 3  # number of starts at which equations are checked for depend
 SERIAL_EVALUATIONS = 800  # evaluations, about a second, after which a search is worth several processes
 ROUNDS = 12  # steps between catalogue values, each of at most two searches per parameter
 LEAST_GAIN = 1e-9  # smallest relative gain of such a step
-Tell = Callable[[int, int, float], None]
+TellStarts = Callable[[int, int, float], None]
 
 
 class SearchOutcome(NamedTuple):
@@ -86,7 +86,7 @@ def explore(
     settings: OptimiseSettings,
     stop: Callable[[], bool] | None = None,
     jobs: int = 1,
-    tell: Tell | None = None,
+    tell: TellStarts | None = None,
 ) -> SearchOutcome:
     """Search from one group of starts after the other until the survey of the basins suffices.
 

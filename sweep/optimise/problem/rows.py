@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.families.base import Array
+from sweep.numerics.records import Mask
 from sweep.optimise.extrema.points import Points
 from sweep.quantities.measures import Measure
 
@@ -44,7 +44,7 @@ class Form:
     matrix: Array
     constant: Array
     slack: Array
-    equal: NDArray[np.bool_]
+    equal: Mask
     labels: tuple[Label, ...]
     complete: bool
     assembles: bool

@@ -9,13 +9,12 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sweep.families.base import Array
+from sweep.numerics.records import Indices, Mask
 from sweep.optimise.problem.statement import Problem
 
-Index = NDArray[np.intp]
-Stop = Callable[[], bool]
+ShouldStop = Callable[[], bool]
 
 
 class Members(NamedTuple):
@@ -26,11 +25,11 @@ class Members(NamedTuple):
     """
 
     places: Array
-    kinds: Index
+    kinds: Indices
     merit: Array
     designs: Array
 
-    def at(self, rows: Index | NDArray[np.bool_] | list[int] | slice) -> Members:
+    def at(self, rows: Indices | Mask | list[int] | slice) -> Members:
         """Return some of the members."""
         return Members(self.places[rows], self.kinds[rows], self.merit[rows], self.designs[rows])
 
@@ -55,15 +54,15 @@ class Landscape(Protocol):
         """Yield blocks of a sample: places and the number of their combination of signs."""
         ...
 
-    def values(self, places: Array, kinds: Index) -> Array:
+    def values(self, places: Array, kinds: Indices) -> Array:
         """Return the values of places."""
         ...
 
-    def first(self, sample: Members, rng: np.random.Generator, stop: Stop) -> Members:
+    def first(self, sample: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return the first generation: diverse good members of a sample, improved."""
         ...
 
-    def children(self, parents: Members, rng: np.random.Generator, stop: Stop) -> Members:
+    def children(self, parents: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return improved children of parents."""
         ...
 
@@ -72,7 +71,7 @@ class Landscape(Protocol):
         ...
 
 
-def populations(landscape: Landscape, most: int, seed: int, stop: Stop = lambda: False) -> Iterator[Members]:
+def populations(landscape: Landscape, most: int, seed: int, stop: ShouldStop = lambda: False) -> Iterator[Members]:
     """Yield the ends of independent populations, one after the other, as long as the caller requests them.
 
     Parameters
@@ -88,7 +87,7 @@ def populations(landscape: Landscape, most: int, seed: int, stop: Stop = lambda:
         yield population(landscape, (seed, number), stop)
 
 
-def population(landscape: Landscape, seed: tuple[int, int], stop: Stop = lambda: False) -> Members:
+def population(landscape: Landscape, seed: tuple[int, int], stop: ShouldStop = lambda: False) -> Members:
     """Return the ends of one population, the best first."""
     rng = np.random.default_rng(seed)
     sample = list[Members]()
@@ -105,14 +104,14 @@ def population(landscape: Landscape, seed: tuple[int, int], stop: Stop = lambda:
     return landscape.diverse(members, landscape.ends)
 
 
-def best_tries(landscape: Landscape, tries: Array, kinds: Index) -> Members:
+def best_tries(landscape: Landscape, tries: Array, kinds: Indices) -> Members:
     """Return the best of the tries (k, t, n) of each child, of kinds (k,)."""
     count = tries.shape[1]
     valued = _valued(landscape, tries.reshape(-1, tries.shape[2]), np.repeat(kinds, count))
     return valued.at(np.arange(len(tries)) * count + np.argmin(valued.merit.reshape(-1, count), axis=1))
 
 
-def _valued(landscape: Landscape, places: Array, kinds: Index) -> Members:
+def _valued(landscape: Landscape, places: Array, kinds: Indices) -> Members:
     return Members(places, kinds, landscape.values(places, kinds), places[:, :0])
 
 
@@ -141,7 +140,7 @@ def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: f
     return ranked[spread(problem.scaled(ranked), kind.reshape(-1), count, least)]
 
 
-def spread(points: Array, kind: NDArray[np.intp], count: int, least_share: float = 0.0, first: int = 0) -> list[int]:
+def spread(points: Array, kind: Indices, count: int, least_share: float = 0.0, first: int = 0) -> list[int]:
     """Return the numbers of the best rows that keep a distance from each other.
 
     At most ``count`` rows of ``points`` (k, n), which is ranked with the best first, are taken.

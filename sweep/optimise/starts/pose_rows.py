@@ -12,7 +12,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels.curves.sampled_rows import EVERY, HIGHEST, LOWEST, RANGE, Limits
 from kernels.descent.descents import BOX, LEAST, LOCKED, RADIUS, descend, initial_merits
@@ -33,11 +32,11 @@ from kernels.descent.unknowns import OBJECTIVE, OMITTED, REQUIRED, SOFT
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.capabilities import Assembly
+from sweep.numerics.records import Indices
 from sweep.optimise.starts.linear import POSES, TURN, Elimination
 from sweep.quantities.measures import ROTATABLE_MARGIN, Measure, measure
 
 T = TypeVar("T")
-Index = NDArray[np.intp]
 
 SHORT = 0.15  # shortest initial length of a guide, relative to the longest that its crank may have
 MIDDLE = Accuracy(target=1e-3)
@@ -106,7 +105,7 @@ class PoseRows:
             if name in links or (units[name] == "length" and self.low[k] > 0.0):
                 self.log_width[k] = math.log(self.high[k] / self.low[k])
 
-    def placed(self, places: Array, kinds: Index) -> Array:
+    def placed(self, places: Array, kinds: Indices) -> Array:
         """Return designs (k, P) at places (k, n), of kinds (k,), without the point, line and scale of the guide."""
         values: Array = self.low + places * (self.high - self.low)
         logarithmic = self.log_width != 0.0
@@ -117,7 +116,7 @@ class PoseRows:
         designs[:, self.columns] = values
         return designs
 
-    def input_range(self, places: Array, kinds: Index) -> tuple[Array, Array]:
+    def input_range(self, places: Array, kinds: Indices) -> tuple[Array, Array]:
         """Return middle and range (k,) of the guide's input angles without offset; 0 if stage 1 does not turn."""
         upstream = np.ascontiguousarray(self.placed(places, kinds)[:, : len(self.driver.parameters)])
         outputs = design_outputs(self.driver, upstream, ("psi_ext", "swing"), MIDDLE)
@@ -188,7 +187,7 @@ class PoseRows:
             np.empty(0) if linear.sigma is None else linear.level * linear.sigma,
         )  # fmt: skip
 
-    def without_middle(self, places: Array, kinds: Index, sign: float = -1.0) -> Array:
+    def without_middle(self, places: Array, kinds: Indices, sign: float = -1.0) -> Array:
         """Return places with the offset between the stages in place of the middle of the guide's input angles."""
         out = places.copy()
         if self.offset >= 0:
@@ -204,15 +203,15 @@ class PoseRows:
             out[..., self.offset] = places[..., self.offset] % 1.0
         return out
 
-    def with_middle(self, places: Array, kinds: Index) -> Array:
+    def with_middle(self, places: Array, kinds: Indices) -> Array:
         """Return places with the middle of the guide's input angles in place of the offset between the stages."""
         return self.without_middle(places, kinds, 1.0)
 
-    def finished(self, places: Array, kinds: Index, x: Array) -> Array:
+    def finished(self, places: Array, kinds: Indices, x: Array) -> Array:
         """Return designs (k, P) at places (k, n) with the linear unknowns (k, 5)."""
         return self.linear.finished(self.placed(places, kinds), x)
 
-    def initial(self, places: Array, kinds: Index, jobs: int = 1) -> tuple[Array, Array]:
+    def initial(self, places: Array, kinds: Indices, jobs: int = 1) -> tuple[Array, Array]:
         """Return the best linear unknowns (k, 5) of some places, and the values of the designs (k,)."""
         x, merit = np.empty((len(places), UNKNOWNS)), np.empty(len(places))
 
@@ -234,7 +233,7 @@ class Descents:
     jobs : number of threads; the descents are independent
     """
 
-    def __init__(self, rows: PoseRows, places: Array, kinds: Index, jobs: int = 1) -> None:
+    def __init__(self, rows: PoseRows, places: Array, kinds: Indices, jobs: int = 1) -> None:
         self.rows, self.places, self.kinds, self.jobs = rows, places.copy(), kinds, jobs
         self.x, merit = rows.initial(self.places, kinds, jobs)
         k, n = places.shape
@@ -248,7 +247,7 @@ class Descents:
         """Present value of each descent."""
         return self.states[:, 0]
 
-    def keep(self, numbers: NDArray[np.intp]) -> None:
+    def keep(self, numbers: Indices) -> None:
         """Continue only the descents with these numbers."""
         for name in ("places", "kinds", "x", "states", "curvature"):
             setattr(self, name, getattr(self, name)[numbers])

@@ -17,15 +17,15 @@ from kernels.descent.descents import LOCKED
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, best_words, unsaid
+from sweep.numerics.records import Indices
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.multistart.survey import StartGroup
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import kinds, task_designs
 from sweep.optimise.starts.linear import NEEDED, Elimination, elimination, widened, within_turn
 from sweep.optimise.starts.populations import (
-    Index,
     Members,
-    Stop,
+    ShouldStop,
     best_tries,
     diverse,
     joined,
@@ -89,11 +89,11 @@ class Proportions:
         for kind in range(self.sign_count):
             yield qmc.Sobol(len(self.rows.columns), seed=rng).random(self.size.sampled), kind
 
-    def values(self, places: Array, kinds: Index) -> Array:
+    def values(self, places: Array, kinds: Indices) -> Array:
         """Return the values, before any descent, of places with the middle of the guide's input angles."""
         return self.rows.initial(self.rows.without_middle(places, kinds), kinds, self.jobs)[1]
 
-    def first(self, sample: Members, rng: np.random.Generator, stop: Stop) -> Members:
+    def first(self, sample: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return the ends of descents from diverse good members of each class of swings."""
         turning = sample.at(sample.merit < LOCKED).ranked
         better = turning.at(slice(len(turning.merit) // 4))
@@ -104,12 +104,12 @@ class Proportions:
             selected += rows[spread(turning.places[rows], turning.kinds[rows], count)].tolist()
         return self._descended(turning.at(sorted(selected)), better, stop)
 
-    def children(self, parents: Members, rng: np.random.Generator, stop: Stop) -> Members:
+    def children(self, parents: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return the ends of descents from children, each the best of many tries."""
         best = [best_tries(self, tries, np.full(len(tries), kind)) for tries, kind in self._tries(parents, rng)]
         return self._descended(joined(*best), parents, stop)
 
-    def _descended(self, members: Members, reference: Members, stop: Stop) -> Members:
+    def _descended(self, members: Members, reference: Members, stop: ShouldStop) -> Members:
         """Return the ends of descents; the worse half stops after the first heat.
 
         The halves are formed in each class, among the swings of a ``reference``, of each kind.
@@ -125,7 +125,7 @@ class Proportions:
         ends = Members(rows.with_middle(runs.places, runs.kinds), runs.kinds, runs.merit, designs)
         return ends.at(runs.merit < LOCKED)
 
-    def _groups(self, members: Members | Descents, reference: Members) -> Index:
+    def _groups(self, members: Members | Descents, reference: Members) -> Indices:
         """Return the number of each member's kind and class among the swings of a ``reference``."""
         return members.kinds * CLASSES + _classes(self._swings(members), self._swings(reference))
 
@@ -150,7 +150,7 @@ class Proportions:
                 tries[:, :, redrawn] = rng.random((random_count, RANDOM_TRIES, int(redrawn.sum())))
                 yield rows.wrapped(tries), kind
 
-    def _mixed(self, places: Array, pool: Index, rng: np.random.Generator, count: int) -> Array:
+    def _mixed(self, places: Array, pool: Indices, rng: np.random.Generator, count: int) -> Array:
         """Combine stage 1 of one parent with the guide of another in a pool, slightly varied, in many tries of a child.
 
         Offsets with bounds symmetric to zero change their sign in every second try, since a crank-rocker and its mirror
@@ -192,7 +192,7 @@ class Proportions:
         return useful.at(taken)
 
 
-def _classes(swings: Array, reference: Array) -> Index:
+def _classes(swings: Array, reference: Array) -> Indices:
     """Return the class (k,) of each swing, of equal width on a log scale between the extremes of useful swings."""
     useful = reference[reference > SMALLEST]
     if not len(useful) or not useful.min() < useful.max():
@@ -202,7 +202,7 @@ def _classes(swings: Array, reference: Array) -> Index:
 
 
 def from_populations(
-    study: Study, problem: Problem, designs: Array, merit: Array, stop: Stop, jobs: int
+    study: Study, problem: Problem, designs: Array, merit: Array, stop: ShouldStop, jobs: int
 ) -> Iterator[StartGroup]:
     """Yield groups of starts: the best end of each population, and one with another value.
 
@@ -259,7 +259,7 @@ def insensitive(
     study: Study,
     settings: OptimiseSettings,
     problem: Problem,
-    stop: Stop,
+    stop: ShouldStop,
     jobs: int,
     say: Say = unsaid,
     designs_found: Array | None = None,

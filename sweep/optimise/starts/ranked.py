@@ -13,10 +13,11 @@ import numpy as np
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
+from sweep.numerics.records import Indices
 from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup
 from sweep.optimise.problem.program import violation_scale
 from sweep.optimise.problem.statement import Problem
-from sweep.optimise.starts.populations import Index, Members, Stop, best_tries, populations, spread
+from sweep.optimise.starts.populations import Members, ShouldStop, best_tries, populations, spread
 from sweep.quantities.limits import compared
 from sweep.quantities.measures import ROTATABLE_MARGIN, margins
 
@@ -39,7 +40,7 @@ OUTSIDE, NOT_TURNING = 1e100, 1e200  # above every objective: violates its limit
 
 
 def samples(
-    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, stop: Stop = lambda: False
+    problem: Problem, signs: Sequence[dict[str, float]], count: int, seed: int, stop: ShouldStop = lambda: False
 ) -> Iterator[StartGroup]:
     """Yield at most ``count`` good designs, population by population; the same arguments give the same designs.
 
@@ -79,14 +80,14 @@ class Ranked:
         for k in range(max(-(-SAMPLED * self.ends // block), len(self.bases))):
             yield _drawn_within(self.problem, sobol.random(block)), k % len(self.bases)
 
-    def values(self, places: Array, kinds: Index, accuracy: Accuracy = ACCURACY) -> Array:
+    def values(self, places: Array, kinds: Indices, accuracy: Accuracy = ACCURACY) -> Array:
         """Return the ranks of places."""
         return ranking(self.problem, self._placed(places, kinds), accuracy)
 
-    def _placed(self, places: Array, kinds: Index) -> Array:
+    def _placed(self, places: Array, kinds: Indices) -> Array:
         return self.problem.placed(self.bases[kinds], places)
 
-    def first(self, sample: Members, rng: np.random.Generator, stop: Stop) -> Members:
+    def first(self, sample: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return diverse good members of a sample, improved: up to half keep the limits, the others are distant.
 
         A limit may leave several separate regions.  A sample can miss the smallest, which is then reached from
@@ -107,7 +108,7 @@ class Ranked:
             members = members.at(members.merit <= members.merit[:feasible_count].max())
         return members
 
-    def children(self, parents: Members, rng: np.random.Generator, stop: Stop) -> Members:
+    def children(self, parents: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Replace each design repeatedly by the best of the tries around it; without a better one halve the radius."""
         places, kinds, merit = parents.places.copy(), parents.kinds, parents.merit.copy()
         radius = np.full(len(places), RADIUS)

@@ -70,7 +70,7 @@ def second_pressure_limit(angle: Array, largest: float) -> Array:
     return slack
 
 
-Points: TypeAlias = NDArray[np.complex128]
+PlanePath: TypeAlias = NDArray[np.complex128]
 
 
 class FourBar:
@@ -89,7 +89,7 @@ class FourBar:
     }
     coordinates: tuple[str, ...] = ("s", "dev", "ds", "ddev")
 
-    def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[Points, Points]:
+    def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[PlanePath, PlanePath]:
         """Return the working point and its derivative by the crank angle, (n, m), for a crank of 1."""
         x, y, dx, dy = self.poses(shape, angles, branch, self.coordinates)
         return x + 1j * y, dx + 1j * dy
@@ -115,7 +115,7 @@ class RockerSlider(FourBar):
     shape: ClassVar[Mapping[str, tuple[float, float]]] = {"coupler": (1.05, 5.0), "offset": (-4.0, 4.0), **SIDEWAYS}
     dimensions: ClassVar[Mapping[str, str]] = {"coupler": "b", "offset": "e", "along": "xi", "across": "eta"}
 
-    def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[Points, Points]:
+    def path(self, shape: Mapping[str, Array], angles: Angles, branch: int) -> tuple[PlanePath, PlanePath]:
         """Return the working point and its derivative by the crank angle, (n, m), for a crank of 1."""
         proportions = {name: shape[name] for name in ("coupler", "offset")}
         s, ds = self.poses(proportions, angles, branch, ("s", "ds"))
