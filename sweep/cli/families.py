@@ -8,33 +8,23 @@ import click
 
 from sweep.errors import LinksweepError
 from sweep.evaluation.summaries import output, output_names
-from sweep.families import NAMES, chain_names, family
+from sweep.families import NAMES, capabilities, chain_names, family
 from sweep.families.base import Family, Parameter
-from sweep.families.capabilities import (
-    Assembly,
-    CrankRockerLoop,
-    GuidedPoint,
-    JointRecords,
-    LimitLocus,
-    OutputLink,
-    PressureEllipse,
-    ProvableLocus,
-)
 from sweep.families.link_tree import LinkTree
 from sweep.families.machines.machine import Machine
 from sweep.families.reduction import prefixes
 from sweep.quantities.resolve import event_names
 
 CAPABILITIES = (
-    (Assembly, "rotatability"),
-    (JointRecords, "loads"),
+    (capabilities.Assembly, "rotatability"),
+    (capabilities.JointRecords, "loads"),
     (LinkTree, "loads"),
-    (PressureEllipse, "pressure extrema"),
-    (CrankRockerLoop, "proofs"),
-    (LimitLocus, "limit locus"),
-    (ProvableLocus, "proven optimum"),
-    (GuidedPoint, "line fit"),
-    (OutputLink, "tip"),
+    (capabilities.PressureEllipse, "pressure extrema"),
+    (capabilities.CrankRockerLoop, "proofs"),
+    (capabilities.LimitLocus, "limit locus"),
+    (capabilities.ProvableLocus, "proven optimum"),
+    (capabilities.GuidedPoint, "line fit"),
+    (capabilities.OutputLink, "tip"),
 )
 
 
@@ -124,7 +114,7 @@ def main_outputs(family: Family) -> list[str]:
     general = {f"{prefix}{name}" for prefix in prefixes(family.domain) for name in family.pose_names}
     first = {f"max_abs_{name}" for name in family.derivative_of.values()}
     first |= {f"max_abs_{o.name}" for o in family.pose_outputs if o.windowed}
-    first |= {f"max_{loop.pressure_angle}" for loop in family.every(Assembly)}
+    first |= {f"max_{loop.pressure_angle}" for loop in family.every(capabilities.Assembly)}
     return [name for name in output_names(family) if name not in general or name in first]
 
 

@@ -18,16 +18,7 @@ from typing import Any, TextIO
 import click
 from click.shell_completion import CompletionItem
 
-from sweep.errors import (
-    LinksweepError,
-    LinksweepWarning,
-    ProgramFault,
-    StoreError,
-    WorkerDied,
-    is_memory_full,
-    nearest,
-    reason,
-)
+from sweep import errors
 from sweep.jobs.signals import leaving_within
 
 SIGNALLED = 128  # plus the number of the signal: the exit code that a shell expects of an interrupted command
@@ -93,7 +84,7 @@ class Verbs(click.Group):
             from sweep.study.tables import TABLES
 
             hint = f"; [{word}] is a table of a study, which `sweep run STUDY` obeys" if word in TABLES else ""
-            ctx.fail(f"No such command '{word}'{nearest(word, VERBS) or hint}")
+            ctx.fail(f"No such command '{word}'{errors.nearest(word, VERBS) or hint}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -112,8 +103,8 @@ class Verbs(click.Group):
             with leaving_within(SECONDS_TO_LEAVE, WORDS), warnings.catch_warnings():
                 warnings.showwarning = _show_warning
                 return super().invoke(ctx)
-        except LinksweepError as error:
-            if isinstance(error, ProgramFault):
+        except errors.LinksweepError as error:
+            if isinstance(error, errors.ProgramFault):
                 click.echo(error.trace, err=True)
             click.echo(f"sweep: {error}", err=True)
             ctx.exit(error.exit_code)
@@ -121,15 +112,19 @@ class Verbs(click.Group):
             click.echo("sweep: interrupted", err=True)
             ctx.exit(SIGNALLED + getattr(error, "number", signal.SIGINT))
         except (OSError, MemoryError, ImportError, RuntimeError) as error:
-            if is_memory_full(error):
+            if errors.is_memory_full(error):
                 _last_words("sweep: the memory it may use is full; fewer jobs need less")
-                ctx.exit(WorkerDied.exit_code)
+                ctx.exit(errors.WorkerDied.exit_code)
             if not isinstance(error, OSError) or error.errno == errno.EPIPE:  # click handles a closed pipe
                 raise
             gone = isinstance(error, FileNotFoundError) and not _is_here()
-            words = "the folder it was started in is not there any more; go to another one" if gone else reason(error)
+            words = (
+                "the folder it was started in is not there any more; go to another one"
+                if gone
+                else errors.reason(error)
+            )
             _last_words(f"sweep: {words}")
-            ctx.exit(StoreError.exit_code)
+            ctx.exit(errors.StoreError.exit_code)
 
 
 def _last_words(text: str) -> None:
@@ -148,7 +143,7 @@ def _show_warning(
     line: str | None = None,
 ) -> None:
     """Print a warning of this package in one line, any other in Python's format."""
-    if issubclass(category, LinksweepWarning):
+    if issubclass(category, errors.LinksweepWarning):
         click.echo(f"sweep: {message}", err=True)
     else:
         sys.stderr.write(warnings.formatwarning(message, category, filename, lineno, line))

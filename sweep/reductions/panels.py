@@ -21,18 +21,9 @@ from sweep.numerics.chebyshev import NODES
 from sweep.numerics.panel_search import AGAIN, NARROWEST, PANELS, CurveValues, Top, climbed, fitted, measured, places
 from sweep.numerics.records import Indices
 from sweep.quantities.kinds import Request
+from sweep.reductions import sampling
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
 from sweep.reductions.rounding import ALONE, PLACES, order_of, rounding_by_pieces, shaken_anywhere, singular_share
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    Extremum,
-    blocks,
-    continued,
-    discriminants,
-    pose_columns,
-    unwrapped,
-    worst_of_pieces,
-)
 
 VANISHED = 1e-4  # share of the size below which a root counts as a zero: of a cube root of forces of 1e-12
 STEADY = 10.0 * AGAIN  # times EPS of a value: largest error claimed for a curve that is constant but for rounding
@@ -46,7 +37,7 @@ def has_kinks(family: Family, request: Request, jumps: bool = False) -> bool:
 
 def extrema(
     family: Family, designs: Array, requests: Sequence[Request], target: float, locate: bool
-) -> tuple[dict[Request, Extremum], Status]:
+) -> tuple[dict[Request, sampling.Extremum], Status]:
     """Compute extrema over one turn of curves with kinks and jumps.
 
     Parameters
@@ -63,9 +54,9 @@ def extrema(
         of the poses
     """
     n = len(designs)
-    found = {request: Extremum.unknown(n) for request in requests}
+    found = {request: sampling.Extremum.unknown(n) for request in requests}
     status: Status = np.zeros(n, np.uint8)
-    for rows in blocks(np.arange(n), 2 * PANELS * NODES, len(requests)):
+    for rows in sampling.blocks(np.arange(n), 2 * PANELS * NODES, len(requests)):
         for some in _cut_alike(family, requests):
             now = _block(family.precise(), designs, rows, target, {request: found[request] for request in some}, locate)
             status[rows] = np.where(status[rows] == st.OK, now, status[rows])
@@ -81,14 +72,14 @@ def _cut_alike(family: Family, requests: Sequence[Request]) -> list[list[Request
 
 
 def _block(
-    family: Family, designs: Array, rows: Indices, target: float, found: dict[Request, Extremum], locate: bool
+    family: Family, designs: Array, rows: Indices, target: float, found: dict[Request, sampling.Extremum], locate: bool
 ) -> Status:
     """Search the curves of some designs; fill ``found`` and return their status."""
-    guards = discriminants(family)
+    guards = sampling.discriminants(family)
     names = list(dict.fromkeys([*(request.pose for request in found), *guards]))
     row, low, high = _cut(family, designs[rows], names[0])
-    poses, each = pose_columns(family, designs[rows[row]], places(low, high), names)
-    status = worst_of_pieces(row, each, rows.size)
+    poses, each = sampling.pose_columns(family, designs[rows[row]], places(low, high), names)
+    status = sampling.worst_of_pieces(row, each, rows.size)
     good = status[row] == st.OK
     if not good.any():
         return status
@@ -96,7 +87,7 @@ def _block(
     for request, answer in found.items():
         values = poses[request.pose][good]
         if family.pose_output[request.pose].wraps:
-            values, winds = unwrapped(row, values)
+            values, winds = sampling.unwrapped(row, values)
             status[row[winds]] = st.NOT_OSCILLATING
         panels = fitted(row, low, high, values, request.mode)
         curves = _curves(family, designs[rows], request.pose, status)
@@ -118,7 +109,7 @@ def _block(
                 np.minimum(top.err, -top.value, out=top.err, where=top.value <= 0.0)
         if family.pose_output[request.pose].jumps:  # piecewise constant: a polynomial only adds rounding
             beside = top.phi[:, None] + NARROWEST * np.array([-1.0, 0.0, 1.0])  # it may jump at the place itself
-            near_by, _ = pose_columns(family, designs[rows[top.row]], beside, [request.pose])
+            near_by, _ = sampling.pose_columns(family, designs[rows[top.row]], beside, [request.pose])
             heights = measured(near_by[request.pose], request.mode)
             side = np.abs(heights - top.value[:, None]).argmin(axis=1)
             top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
@@ -140,11 +131,11 @@ def _curves(family: Family, designs: Array, pose: str, status: Status) -> CurveV
 
     def curves(row: Indices, phi: Array, middle: Array) -> Array:
         found = np.empty(phi.shape)
-        for some in blocks(np.arange(row.size), phi.shape[1]):
-            poses, each = pose_columns(family, designs[row[some]], phi[some], [pose])
-            found[some] = continued(family, pose, poses[pose], middle[some])
+        for some in sampling.blocks(np.arange(row.size), phi.shape[1]):
+            poses, each = sampling.pose_columns(family, designs[row[some]], phi[some], [pose])
+            found[some] = sampling.continued(family, pose, poses[pose], middle[some])
             lost, at = np.nonzero(each)
-            status[row[some[lost]]] = DESIGN_STATUS[each[lost, at]]
+            status[row[some[lost]]] = sampling.DESIGN_STATUS[each[lost, at]]
         return found
 
     return curves
@@ -153,7 +144,7 @@ def _curves(family: Family, designs: Array, pose: str, status: Status) -> CurveV
 def _vanish(family: Family, designs: Array, pose: str, top: Top, size: Array) -> None:
     """Set the minimum to 0, in place, for curves with a known zero, like the square root of a squared distance."""
     row, phi = zeros(family, designs, pose)
-    values, _ = pose_columns(family, designs[row], phi[:, None], [pose])
+    values, _ = sampling.pose_columns(family, designs[row], phi[:, None], [pose])
     passes = values[pose][:, 0] <= VANISHED * size[row]  # at a jump the function changes its sign without a zero
     first = np.full(len(designs), np.inf)
     np.minimum.at(first, row[passes], np.mod(phi[passes], TWO_PI))

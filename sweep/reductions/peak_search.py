@@ -15,19 +15,10 @@ from sweep.numerics.panel_search import first_of_equals
 from sweep.numerics.records import Indices, Mask, joined, only, put
 from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
-from sweep.reductions import refine, rounding
+from sweep.reductions import refine, rounding, sampling
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
 from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
 from sweep.reductions.resolution import MATTERS, broken, denser, nearest
-from sweep.reductions.sampling import (
-    DESIGN_STATUS,
-    Extremum,
-    continued,
-    discriminants,
-    jumps,
-    pose_columns,
-    sample_turn,
-)
 from sweep.reductions.window import Window, edges
 
 START = 32  # first number of samples
@@ -56,7 +47,7 @@ class PeakSearch:
     locate: bool
     anywhere: bool
     window: Window | None
-    found: dict[Request, Extremum] = field(init=False)
+    found: dict[Request, sampling.Extremum] = field(init=False)
     status: Status = field(init=False)
     undone: Indices = field(init=False)
     names: list[str] = field(init=False)
@@ -66,10 +57,10 @@ class PeakSearch:
 
     def __post_init__(self) -> None:
         n = len(self.designs)
-        self.found = {request: Extremum.unknown(n) for request in self.requests}
+        self.found = {request: sampling.Extremum.unknown(n) for request in self.requests}
         self.status = np.zeros(n, np.uint8)
         # A discriminant is smooth whatever its sign; the motion is not smooth where it vanishes.
-        self.guards = [] if self.anywhere else list(discriminants(self.family))
+        self.guards = [] if self.anywhere else list(sampling.discriminants(self.family))
         position = [self.window.position] if self.window is not None else []
         self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
         # Samples that each request still needs for each design; 0 once its extremum is found.
@@ -97,12 +88,12 @@ class PeakSearch:
 
     def block(self, rows: Indices, samples: int) -> None:
         """Sample some designs, and refine those that the samples resolve."""
-        columns, worst, winds = sample_turn(self.family, self.designs[rows], samples, self.names)
+        columns, worst, winds = sampling.sample_turn(self.family, self.designs[rows], samples, self.names)
         if self.anywhere:
             good = np.logical_and.reduce([np.isfinite(columns[name]).all(axis=1) for name in self.names])
-            self.status[rows] = np.where(good, st.OK, DESIGN_STATUS[worst])
+            self.status[rows] = np.where(good, st.OK, sampling.DESIGN_STATUS[worst])
         else:
-            self.status[rows] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, DESIGN_STATUS[worst])
+            self.status[rows] = np.where((worst == st.OK) & winds, st.NOT_OSCILLATING, sampling.DESIGN_STATUS[worst])
             good = self.status[rows] == st.OK
         self.undone[:, rows[~good]] = 0
         if not good.all():
@@ -155,7 +146,7 @@ class PeakSearch:
                 alone[number] |= rounding.rounding_alone(*given, values, scale, rough > ROUGH)
                 rough[alone[number]] = 0.0
             if samples >= BREAKING and allowed is None and (rough > ROUGH).any():
-                torn = jumps(values, scale, ROUGH)
+                torn = sampling.jumps(values, scale, ROUGH)
                 self.torn[number, rows[torn]], alone[number, torn], rough[torn] = True, True, 0.0
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
             pieces.append(PeakCandidates(np.full(count, number), row, column, sign))
@@ -266,15 +257,17 @@ class PeakSearch:
 
         def sample(active: Indices, phi: Array) -> Array:
             designs = turn.rows[row[active]]
-            poses, status = pose_columns(family, self.designs[designs], phi, self.names)
+            poses, status = sampling.pose_columns(family, self.designs[designs], phi, self.names)
             if not self.anywhere:
                 bad = status != st.OK
                 hit = bad.any(axis=1)
-                self.status[designs[hit]] = DESIGN_STATUS[status[hit, bad[hit].argmax(axis=1)]]
+                self.status[designs[hit]] = sampling.DESIGN_STATUS[status[hit, bad[hit].argmax(axis=1)]]
             out = np.empty(phi.shape)
             for k, request in enumerate(self.requests):
                 mine = number[active] == k
-                values = continued(self.family, request.pose, poses[request.pose][mine], middle[active][mine, None])
+                values = sampling.continued(
+                    self.family, request.pose, poses[request.pose][mine], middle[active][mine, None]
+                )
                 out[mine] = sign[active][mine, None] * values
             return out
 
@@ -295,7 +288,7 @@ class PeakSearch:
     ) -> tuple[Indices, Peaks]:
         """Drop the peaks outside the window, and add its edges as candidates."""
         assert self.window is not None
-        poses, _ = pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
+        poses, _ = sampling.pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
         inside = self.window.holds(rows[row], poses[self.window.position])[:, 0]
         edge = edges(self.family, self.designs, rows, self.window, columns, request.pose)
         edge = only(edge, resolved[edge.row])

@@ -19,20 +19,11 @@ from sweep.proof import read_proof
 from sweep.proof.study import EVENT, proof_words
 from sweep.quantities.dimensions import LINK_RATIO, sizes
 from sweep.quantities.limits import compared
+from sweep.report import tables
 from sweep.report.dataset import Dataset
 from sweep.report.front import Front
 from sweep.report.quantities import ShownQuantity, change, number, quantity, rpm
 from sweep.report.scan import Scan
-from sweep.report.tables import (
-    ACTIVE,
-    LimitState,
-    fates,
-    limit_state,
-    limit_states,
-    limited,
-    parameter_rows,
-    value_of,
-)
 
 MISSED = ("missed", "unknown")
 NEAREST = 4  # inactive limits named in the answer; the table has them all
@@ -45,7 +36,7 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
     """Return the sentences that answer the study's question, most important first; ``further`` before the limits."""
     total = data.designs
     if data.result is None:
-        stops = max(fates(data, scanned)[:-1], key=lambda fate: fate.count, default=None)
+        stops = max(tables.fates(data, scanned)[:-1], key=lambda fate: fate.count, default=None)
         most = [] if stops is None else [f"What stops most of them, {_count(stops.count)}: {stops.text}."]
         return [f"No design of the {_count(total)} in the sweep meets all limits.", *most]
     cut = data.front_steps is not None or (data.survey is not None and data.survey.ended == "time")
@@ -57,14 +48,14 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
     if data.objective is not None:
         sentences.append(_headline(data, who, data.objective))
     second = data.second
-    if second is not None and math.isfinite(value_of(data.result, second)):
+    if second is not None and math.isfinite(tables.value_of(data.result, second)):
         sentences.append(_comparison(data, second))
     proven = proof_sentence(data)
     sentences += [f"{proven[0].upper()}{proven[1:]}."] if proven else []
     sentences += further
     sentences += [] if cut else search_warnings(data)
     # A prescribed output is met by construction if [locus] fixes it, and part of the searched space if it is an axis.
-    states = [s for s in limit_states(data) if s.shown.name not in data.study.prescribed]
+    states = [s for s in tables.limit_states(data) if s.shown.name not in data.study.prescribed]
     sentences += _limit_sentences(states, data.optimum is not None and data.study.wanted_yield is not None)
     sentences += _edge_sentence(data)
     sentences += _sweep_sentences(data, scanned)
@@ -76,7 +67,7 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
 
 
 def _headline(data: Dataset, who: str, shown: ShownQuantity) -> str:
-    value, old = value_of(data.result, shown.name), value_of(data.reference, shown.name)
+    value, old = tables.value_of(data.result, shown.name), tables.value_of(data.reference, shown.name)
     article = "an" if shown.words[0] in "aeiou" else "a"
     text = f"{who} has {article} {shown.words} of {_with_speed(data, shown, value)}"
     if data.reference is None:
@@ -90,7 +81,7 @@ def _headline(data: Dataset, who: str, shown: ShownQuantity) -> str:
 
 def _comparison(data: Dataset, name: str) -> str:
     shown = data.shown(name)
-    value, old = value_of(data.result, name), value_of(data.reference, name)
+    value, old = tables.value_of(data.result, name), tables.value_of(data.reference, name)
     text = f"Its {shown.words} is {_with_speed(data, shown, value)}"
     difference = change(shown, value, old)
     return f"{text}; the reference has {shown.show(old)} ({difference})." if difference else f"{text}."
@@ -101,10 +92,10 @@ def _with_speed(data: Dataset, shown: ShownQuantity, value: float) -> str:
     return f"{shown.show(value)} ({fast} at {rpm(data.study.speed)})" if fast else shown.show(value)
 
 
-def _limit_sentences(states: list[LimitState], robust: bool) -> list[str]:
+def _limit_sentences(states: list[tables.LimitState], robust: bool) -> list[str]:
     """Return sentences about active and inactive limits; a robust design keeps the margin that its tolerances need."""
     active = [f"{s.shown.words} ({s.bound})" for s in states if s.state == "active"]
-    met = sorted((s for s in states if s.state == "met" and s.room > ACTIVE), key=lambda s: s.room)
+    met = sorted((s for s in states if s.state == "met" and s.room > tables.ACTIVE), key=lambda s: s.room)
     slack = [f"{s.shown.words} ({s.value}, {s.bound})" for s in met[:NEAREST]]
     slack += [f"{len(met) - NEAREST} more"] if len(met) > NEAREST else []
     words = f"the active limit{'s' if len(active) > 1 else ''}"
@@ -119,7 +110,7 @@ def _edge_sentence(data: Dataset) -> list[str]:
     """Return a sentence about parameters on the edge of the searched space."""
     if data.study.objective is None:
         return []
-    edges = [f"{row.name} ({row.edge}, {row.value})" for row in parameter_rows(data) if row.edge]
+    edges = [f"{row.name} ({row.edge}, {row.value})" for row in tables.parameter_rows(data) if row.edge]
     return (
         [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider space may hold a better design."]
         if edges
@@ -129,16 +120,18 @@ def _edge_sentence(data: Dataset) -> list[str]:
 
 def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
     """Return a sentence about missed limits, and about an optimiser that did not settle or lost a better design."""
-    faults = [f"{s.shown.words}: {s.value} instead of {s.bound}" for s in limit_states(data) if s.state in MISSED]
+    faults = [
+        f"{s.shown.words}: {s.value} instead of {s.bound}" for s in tables.limit_states(data) if s.state in MISSED
+    ]
     objective = data.objective
     if data.optimum is not None:
         faults += unsettled(data.optimum)
         wanted_yield = data.study.wanted_yield
-        share = value_of(data.optimum, "yield")
+        share = tables.value_of(data.optimum, "yield")
         if wanted_yield is not None and share < wanted_yield:
             faults.append(f"as it is made: {share_words(share, wanted_yield, str(data.optimum.get('ended')))}")
         if objective is not None and scanned.best_row:
-            best, value = scanned.best_row[objective.name], value_of(data.optimum, objective.name)
+            best, value = scanned.best_row[objective.name], tables.value_of(data.optimum, objective.name)
             if not compared(objective.name, value) <= compared(objective.name, best) + BEHIND * abs(best):
                 faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []
@@ -157,7 +150,7 @@ def shortest_link(data: Dataset) -> list[str]:
     ratio = sizes(family).get(LINK_RATIO.name)
     if ratio is None or data.optimum is None:
         return []
-    design = np.array([[value_of(data.optimum, name) for name in family.parameter_names]])
+    design = np.array([[tables.value_of(data.optimum, name) for name in family.parameter_names]])
     value = float(ratio.values(family, design)[0])
     words = f"the shortest link of the optimum has {number(value, 2)} of the length of its longest, which nobody builds"
     return [f"{words}: a limit such as link_ratio = {{ min = 0.1 }} excludes that"] if value < SLIGHTEST else []
@@ -184,12 +177,12 @@ def _against_reference(data: Dataset) -> list[str]:
     criteria = [None if data.objective is None else data.objective.name, data.second]
     worse = []
     for name in filter(None, criteria):
-        value, old = value_of(data.result, name), value_of(data.reference, name)
+        value, old = tables.value_of(data.result, name), tables.value_of(data.reference, name)
         if compared(name, value) > compared(name, old) + 1e-9 * abs(old):
             worse.append(data.shown(name).words)
     missed = []
     for limit in data.study.limits:
-        state = limit_state(limit, data.reference, None, limited(data, limit.output), frozenset())
+        state = tables.limit_state(limit, data.reference, None, tables.limited(data, limit.output), frozenset())
         if state.state in MISSED:
             missed.append(f"{state.shown.words} ({state.value}, {state.bound})")
     return [
@@ -247,7 +240,7 @@ def search_sentence(data: Dataset, scanned: Scan) -> str:
     most = "most of them " if starts > 2 * populations else ""  # at most two per population, others from the sweep
     text += f", {most}ends of {how_many(populations, 'population')}" if populations else " of the sweep"
     text += "" if data.survey is None else f"; {search_words(data, data.survey)}"
-    residual, violation = value_of(data.optimum, "kkt_residual"), value_of(data.optimum, "violation")
+    residual, violation = tables.value_of(data.optimum, "kkt_residual"), tables.value_of(data.optimum, "violation")
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
     words = "" if math.isnan(residual) and proof_sentence(data) else f"{_residual(residual)}{wanted}, "
     return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."
@@ -307,7 +300,7 @@ def _behind_the_front(data: Dataset) -> tuple[str, ...]:
             good &= front["bound"] >= bound if study.pareto.at_least else front["bound"] <= bound
     least = float(compared(objective.name, front[objective.name][good].to_numpy()).min(initial=math.inf))
     missed = int(best.get("status", 0)) == codes.LIMIT_EXCEEDED
-    value = math.inf if missed else compared(objective.name, value_of(best, objective.name))
+    value = math.inf if missed else compared(objective.name, tables.value_of(best, objective.name))
     better = math.isfinite(least) and least < value - BEHIND * abs(least)
     words = f"the front has a better design within all limits, {objective.show(least)}: run more starts"
     return (words,) if better else ()

@@ -16,25 +16,7 @@ import numpy as np
 from sweep.families.base import Angles, Array
 from sweep.families.poses import differentiable
 from sweep.numerics.records import Indices
-from sweep.optimise.extrema.scanned import (
-    CROSSING,
-    EDGE,
-    PASSING,
-    STATIC,
-    STATIONARY,
-    PointRow,
-    bending,
-    discriminant_scale,
-    distances,
-    edge_extrema,
-    edges,
-    extrema,
-    may_bend,
-    moved_edges,
-    overtopped,
-    passages,
-    poses_needed,
-)
+from sweep.optimise.extrema import scanned
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.measures import Series, curve
 from sweep.reductions.sampling import on_closed_turn
@@ -78,7 +60,7 @@ class Points:
         return replace(self, phi=self.phi + offset)
 
     @classmethod
-    def of(cls, rows: Iterable[PointRow]) -> Points:
+    def of(cls, rows: Iterable[scanned.PointRow]) -> Points:
         """Return points from rows (series, phi, sense, how, level, value)."""
         table = np.array(list(rows), dtype=np.float64).reshape(-1, 6)
         zeros = np.zeros(len(table))
@@ -111,7 +93,7 @@ class Curves:
         self.wanted = frozenset(names)
         self.with_angles = with_angles
         self.plain = tuple(s.output for s in series if _is_plain(s))
-        self.may_bend = may_bend(problem.family, self.plain)
+        self.may_bend = scanned.may_bend(problem.family, self.plain)
         self.calls = 0
 
     def poses(self, designs: Any, phi: Any, wanted: frozenset[str] | None = None) -> dict[str, Any]:
@@ -130,25 +112,25 @@ class Curves:
         Only maxima in the upper half of a curve's range and minima in the lower half are kept.  A curve that is
         undefined at some angle has none.
         """
-        samples = max(samples, poses_needed(self.problem.family, design, self.wanted))
+        samples = max(samples, scanned.poses_needed(self.problem.family, design, self.wanted))
         phi: Array = np.arange(samples, dtype=np.float64) * (2.0 * math.pi / samples)
         columns = self.poses(design[None, :], phi)
         turns = not columns["status"].any()
-        rows: list[PointRow] = []
+        rows: list[scanned.PointRow] = []
         windowed = [n for n, s in enumerate(self.series) if s.window is not None]
         for n, s in enumerate(self.series):
             if s.passes is not None:
-                rows += passages(n, phi, self.curve(s, columns)[0], *s.passes)
+                rows += scanned.passages(n, phi, self.curve(s, columns)[0], *s.passes)
             elif n not in windowed:
                 x, margin = self.curve(s, columns)[0], self._margin(n, design[None, :], phi)[0]
                 for sense in (1.0, -1.0):
-                    rows += extrema(n, phi, x + sense * margin, s.wrapped, sense)
+                    rows += scanned.extrema(n, phi, x + sense * margin, s.wrapped, sense)
         initial = Points.of(rows)
         points = self.follow(design, initial, stride=2.0 * math.pi / samples)
         if self.may_bend and turns:
             points = self._with_edges(design, columns, initial, points, 2.0 * math.pi / samples)
         if windowed and turns:
-            edge_rows: list[PointRow] = []
+            edge_rows: list[scanned.PointRow] = []
             for n in windowed:
                 edge_rows += self._in_window(n, design, phi, columns, points)
             points = self.follow(design, Points.joined(points, Points.of(edge_rows)), stride=2.0 * math.pi / samples)
@@ -158,25 +140,25 @@ class Curves:
         self, design: Array, columns: dict[str, Any], initial: Points, points: Points, stride: float
     ) -> Points:
         """Add the points at curve edges; ``initial`` are the unrefined points, on samples ``stride`` apart."""
-        names = bending(self.problem.family, design, self.plain)
+        names = scanned.bending(self.problem.family, design, self.plain)
         if not names:
             return points
         bent = [n for n, s in enumerate(self.series) if _is_plain(s) and s.output in {self.plain[k] for k in names}]
-        sides, numbers = edges(self.problem.family, design, self.plain)
+        sides, numbers = scanned.edges(self.problem.family, design, self.plain)
         edge_columns = self.poses(design[None, :], sides.ravel())
         rows = []
         for n in bent:
             values = self.curve(self.series[n], edge_columns)[0].reshape(sides.shape)
-            rows += edge_extrema(n, sides, numbers, values, self.curve(self.series[n], columns)[0])
+            rows += scanned.edge_extrema(n, sides, numbers, values, self.curve(self.series[n], columns)[0])
         at_edges = Points.of(rows)
         at_edges = replace(at_edges, value=self.values(design[None, :], at_edges)[0])
         # An extremum beside an edge is the edge itself; elsewhere a point that ends lower than it began is put back.
         on_bent = np.isin(points.series, bent)
         descended = on_bent & (points.sense * (initial.value - points.value) > 0.0)
         phi = np.where(descended, initial.phi, points.phi)
-        reach = np.where(descended | overtopped(points, at_edges, stride), stride, NEIGHBOUR)
-        near_edge = on_bent & (distances(sides.mean(axis=0), phi) <= reach)
-        restored = replace(initial, kind=np.full(len(initial), STATIC)).take(descended & ~near_edge)
+        reach = np.where(descended | scanned.overtopped(points, at_edges, stride), stride, NEIGHBOUR)
+        near_edge = on_bent & (scanned.distances(sides.mean(axis=0), phi) <= reach)
+        restored = replace(initial, kind=np.full(len(initial), scanned.STATIC)).take(descended & ~near_edge)
         return Points.joined(Points.joined(points.take(~descended & ~near_edge), restored), at_edges)
 
     def curve(self, series: Series, columns: dict[str, Any]) -> Any:
@@ -184,7 +166,7 @@ class Curves:
         x = columns[series.output]
         if series.pressure:
             with np.errstate(invalid="ignore"):
-                x = x / discriminant_scale(x, columns[series.pressure])
+                x = x / scanned.discriminant_scale(x, columns[series.pressure])
         return x
 
     def _margin(self, n: int, designs: Any, phi: Any) -> Any:
@@ -194,7 +176,9 @@ class Curves:
 
     def stroke(self, points: Points, n: int) -> tuple[int, int]:
         """Return the points of smallest and largest position of the follower that defines the window of series n."""
-        limit_points = np.flatnonzero((points.series == self.position[n]) & np.isin(points.kind, (STATIONARY, EDGE)))
+        limit_points = np.flatnonzero(
+            (points.series == self.position[n]) & np.isin(points.kind, (scanned.STATIONARY, scanned.EDGE))
+        )
         low, high = limit_points[points.sense[limit_points] < 0], limit_points[points.sense[limit_points] > 0]
         if not len(low) or not len(high):
             return -1, -1
@@ -209,11 +193,15 @@ class Curves:
         """
         if not len(points):
             return points
-        stationary, passing, at_edge = points.kind == STATIONARY, points.kind == PASSING, points.kind == EDGE
+        stationary, passing, at_edge = (
+            points.kind == scanned.STATIONARY,
+            points.kind == scanned.PASSING,
+            points.kind == scanned.EDGE,
+        )
         phi = points.phi.copy()
         if at_edge.any():
             edge_data = design[None, :], phi[at_edge], points.level[at_edge]
-            phi[at_edge] = moved_edges(self.problem.family, *edge_data, self.plain)[0]
+            phi[at_edge] = scanned.moved_edges(self.problem.family, *edge_data, self.plain)[0]
         by_series = [(s, k) for n, s in enumerate(self.series) if len(k := np.flatnonzero(points.series == n))]
         longest, previous = np.full(len(phi), stride), np.zeros(len(phi))
         for _ in range(12):
@@ -233,7 +221,7 @@ class Curves:
             phi += move
             if np.abs(move).max() < CONVERGED_STEP:
                 break
-        if self.with_angles or (points.kind == CROSSING).any():
+        if self.with_angles or (points.kind == scanned.CROSSING).any():
             slope, curvature, position_slope, _, value = self._derivatives(design, phi, points, by_series)
             # The angle of a passage is itself an atom, so its error is of first order: take one more Newton step.
             with np.errstate(divide="ignore", invalid="ignore"):  # other points may have slope zero
@@ -293,14 +281,16 @@ class Curves:
         return slopes[1], curvature, position.imag / STEP, position.real, value
 
     def _approach_edges(self, points: Points, phi: Array, position: Array, position_slope: Array, move: Array) -> None:
-        for n in np.unique(points.series[points.kind == CROSSING]):
-            edges = (points.kind == CROSSING) & (points.series == n)
+        for n in np.unique(points.series[points.kind == scanned.CROSSING]):
+            crossing = (points.kind == scanned.CROSSING) & (points.series == n)
             low, high = self.stroke(points, n)
             if low >= 0:
-                target = position[low] + points.level[edges] * (position[high] - position[low])
-                move[edges] = -(position[edges] - target) / position_slope[edges]
+                target = position[low] + points.level[crossing] * (position[high] - position[low])
+                move[crossing] = -(position[crossing] - target) / position_slope[crossing]
 
-    def _in_window(self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points) -> list[PointRow]:
+    def _in_window(
+        self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points
+    ) -> list[scanned.PointRow]:
         """Return the extrema inside the window of series n, and both senses at every crossing of the window's edges."""
         series = self.series[n]
         low, high = self.stroke(points, n)
@@ -317,10 +307,10 @@ class Curves:
             for j in np.flatnonzero(np.sign(side) != np.sign(np.roll(side, -1))):
                 weight = side[j] / (side[j] - side[(j + 1) % len(side)])
                 start = phi[j] + weight * (phi[1] - phi[0])
-                rows += [(n, start, sense, CROSSING, edge, x[j]) for sense in (1.0, -1.0)]
+                rows += [(n, start, sense, scanned.CROSSING, edge, x[j]) for sense in (1.0, -1.0)]
         inside = (share >= series.window[0] - 1e-12) & (share <= series.window[1] + 1e-12)
         for sense in (1.0, -1.0):
-            rows += extrema(n, phi, x + sense * self._margin(n, design[None, :], phi)[0], False, sense, inside)
+            rows += scanned.extrema(n, phi, x + sense * self._margin(n, design[None, :], phi)[0], False, sense, inside)
         return rows
 
 
