@@ -28,7 +28,7 @@ from sweep.report.answer import proof_sentence, search_words, share_words, short
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.front import Front
 from sweep.report.tables import bound_words, limit_states, limited
-from sweep.study import Limit, Study
+from sweep.study import Limit
 from sweep.synthesis.fit import fit_line
 
 TURN = np.arange(360, dtype=np.float64) * (2.0 * math.pi / 360)
@@ -73,7 +73,7 @@ def ending(folder: Path) -> Ending:
         lines += [sentence] if (sentence := proof_sentence(data)) else []
     else:
         missed = feasible == 0
-        lines += _nearest_of_space(data.study, data) if missed else []
+        lines += _nearest_of_space(data) if missed else []
     if (front := Front.of(data)) and (sentence := front.sentence()):
         lines.append(f"front: {sentence[0].lower()}{sentence[1:].rstrip('.')}")
     if data.front_steps is not None:
@@ -159,8 +159,9 @@ def _cannot_meet(data: Dataset) -> list[str]:
     return lines
 
 
-def _nearest_of_space(study: Study, data: Dataset) -> list[str]:
+def _nearest_of_space(data: Dataset) -> list[str]:
     """Describe the nearest miss among designs of the space, or without limits the most frequent failure."""
+    study = data.study
     if not study.limits:
         status, count = max(((s, n) for s, n in data.counts.items() if s != codes.OK), key=lambda item: item[1])
         return [f"no design has all that is wanted; {count} of {data.designs}: {meaning(status)}"]

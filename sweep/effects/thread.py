@@ -64,8 +64,9 @@ def _wrap(scene: Scene) -> tuple[Array, Status]:
     return np.ascontiguousarray(found[name], dtype=np.float64), np.array(found["status"], np.uint8)
 
 
-def _per_pose(scene: Scene, name: str) -> Array:
-    return np.ascontiguousarray(np.broadcast_to(scene.inputs[name][:, None], scene.shape))
+def _tension(scene: Scene) -> Array:
+    """Tension in front of the eyelet at every pose, (n, m)."""
+    return np.ascontiguousarray(np.broadcast_to(scene.inputs["thread_tension"][:, None], scene.shape))
 
 
 def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
@@ -73,7 +74,7 @@ def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
     wrap, status = _wrap(scene)
     names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
     # The constants are per degree.
-    arguments = _per_pose(scene, "thread_tension"), np.degrees(wrap), scene.table(names)
+    arguments = _tension(scene), np.degrees(wrap), scene.table(names)
     outputs = *(o.name for o in CONTOUR_OUTPUTS), "radius of the thread, which nobody asks for"
     return filled_each(thread_contour, arguments, outputs, wanted, status)
 
@@ -81,7 +82,7 @@ def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
 def euler(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Compute the tension by Euler's law and the force on the eyelet."""
     wrap, status = _wrap(scene)
-    arguments = _per_pose(scene, "thread_tension"), wrap, scene.inputs["mu_eyelet"]
+    arguments = _tension(scene), wrap, scene.inputs["mu_eyelet"]
     return filled_each(capstan, arguments, tuple(o.name for o in CAPSTAN_OUTPUTS), wanted, status)
 
 

@@ -40,7 +40,7 @@ def crank_rocker(points: Mapping[str, Array]) -> FittedPose:
         "b": _length(coupler, small, "C", "another point than B"),
         "c": _length(rocker - (rocker @ z) * z, small, "C", "a point off the rocker axis"),
     }
-    branch = _sign(float(coupler @ (np.cos(psi) * y - np.sin(psi) * x)), small, "C")
+    branch = _sign(float(coupler @ (np.cos(psi) * y - np.sin(psi) * x)), small)
     offsets = {"e": e, "f": f, "g": float((d - a) @ z) + f * cos, "alpha": math.atan2(sin, cos), "branch": branch}
     return FittedPose(lengths | offsets, phi, a - f * u, z, x)
 
@@ -61,7 +61,7 @@ def slider_crank(points: Mapping[str, Array]) -> FittedPose:
     alpha = math.atan2(float(u @ y), float(u @ z) if crossed else 0.0)
     offsets = {"e": e, "f": f, "alpha": alpha}
     phi = math.atan2(float(crank @ np.cross(u, x)), float(crank @ x))
-    return FittedPose(lengths | offsets | {"branch": _sign(float(coupler @ y), small, "C")}, phi, a - f * u, z, x)
+    return FittedPose(lengths | offsets | {"branch": _sign(float(coupler @ y), small)}, phi, a - f * u, z, x)
 
 
 def four_bar(points: Mapping[str, Array]) -> FittedPose:
@@ -97,7 +97,7 @@ def planar_slider_crank(points: Mapping[str, Array]) -> FittedPose:
         "a": _length(crank, small, "B", "another point than A"),
         "b": _length(rod, small, "C", "another point than B"),
         "e": float((points.get("D", c) - a) @ y),
-        "branch": _sign(float(rod @ x), small, "C"),
+        "branch": _sign(float(rod @ x), small),
     }
     return FittedPose(parameters, math.atan2(float(crank @ y), float(crank @ x)), a, z, x)
 
@@ -149,10 +149,11 @@ def _length(vector: Array, small: float, name: str, allowed: str) -> float:
     return length
 
 
-def _sign(value: float, small: float, name: str) -> float:
+def _sign(value: float, small: float) -> float:
+    """Return the assembly mode by the sign of the coupler along the follower's way, unless that is small."""
     if abs(value) <= small:
         allowed = "points of another position: in this one, a dead point, both assembly modes meet"
-        raise InputError(name, "coupler and follower are square", allowed, PLACE)
+        raise InputError("C", "coupler and follower are square", allowed, PLACE)
     return math.copysign(1.0, value)
 
 

@@ -85,11 +85,11 @@ class ShownQuantity:
             stored = 0.0
         return with_unit(number(stored * self.factor, digits), self.unit)
 
-    def at_speed(self, stored: float, speed: float | None, digits: int = 4) -> str:
+    def at_speed(self, stored: float, speed: float | None) -> str:
         """Return the value at the scene's speed with its unit; empty for a quantity that is no derivative."""
         if speed is None or self.order == 0:
             return ""
-        return with_unit(number(stored * self.speed_scale * abs(speed) ** self.order, digits), self.speed_unit)
+        return with_unit(number(stored * self.speed_scale * abs(speed) ** self.order, 4), self.speed_unit)
 
 
 def with_unit(text: str, unit: str) -> str:

@@ -192,7 +192,7 @@ class _Approach:
         levels = dict.fromkeys(margin_keys(self.problem).values(), self.level)
         start, design = self.numbers[number], self.designs[number]
         scatter = Scatter(self.problem, self.tolerance)
-        result, *_ = _margin_rounds(scatter, start, design, levels, should_stop, ROUNDS, self.budget, RADIUS)
+        result, *_ = _margin_rounds(scatter, start, design, levels, should_stop, self.budget, RADIUS)
         return Robust(result, math.nan, result.ended in CUT)
 
 
@@ -222,7 +222,7 @@ class _Calibrate:
                 # one search.
                 budget = max(min(FIRST_BUDGET, self.budget), (self.budget - spent) // ROUNDS)
                 result, radius, step = _margin_rounds(
-                    scatter, initial.start, design, levels, should_stop, ROUNDS, budget, radius
+                    scatter, initial.start, design, levels, should_stop, budget, radius
                 )
                 spent += result.looks
                 if not np.array_equal(result.design, design):
@@ -281,7 +281,6 @@ def _margin_rounds(
     design: Array,
     levels: Levels,
     should_stop: Callable[[], bool],
-    rounds: int,
     budget: int,
     radius: float,
 ) -> tuple[Result, float, float]:
@@ -293,7 +292,7 @@ def _margin_rounds(
     """
     problem = scatter.problem
     evaluations, step, margin_design, previous = 0, math.inf, design, np.zeros(len(problem.variables))
-    for _ in range(rounds):
+    for _ in range(ROUNDS):
         result = search(number, with_margins(scatter, design, levels, radius), design, should_stop, budget)
         evaluations += result.looks
         move = (problem.scaled(result.design[None, :]) - problem.scaled(design[None, :]))[0]
