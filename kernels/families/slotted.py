@@ -172,7 +172,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             write(out.rho, i, j, p * r.unit if has_angle else math.nan)
             if out.pressure_angle is not None:  # LLVM does not drop a hypotenuse that is not wanted
                 write(out.pressure_angle, i, j, _pressure_angle(r, ball, p, is_bar) if has_angle else math.nan)
-            at_joints = _joints(r, designs[i, 3] / r.unit, ball, v, p, c, s)
+            at_joints = _joints(r, designs[i, 3] / r.unit, ball, u, v, c, s)
             put_block(out.joints, i, j, at_joints, r.unit if has_angle else math.nan)
             w, w1, w2, p1, p2, p3 = _derivatives(r, ball, u, v, c, s, p, is_bar)
             write(out.dpsi, i, j, w)
@@ -207,13 +207,12 @@ def _pressure_angle(r: Reduced, ball: Ball, p: Any, is_bar: bool) -> Any:
 
 
 @inline
-def _joints(r: Reduced, g: Any, ball: Ball, v: Any, p: Any, c: Any, s: Any) -> tuple[Any, ...]:
+def _joints(r: Reduced, g: Any, ball: Ball, u: Any, v: Any, c: Any, s: Any) -> tuple[Any, ...]:
     """Ball and the point that guides it, x y z each."""
-    z = r.lift - r.na * v
-    # a bar has a height of its own; the fork slot guides the ball at the ball's height
+    x, z = r.a * u, r.lift - r.na * v  # not from the driven axis, which would cost a short crank its digits
+    # the fork slot guides the ball itself; a bar has a height of its own
     height = g + 0.0 * z if r.k.real > 0.0 else z
-    guide = (r.e + p * c - r.s * s, p * s + r.s * c, height)
-    return (ball.x + r.e, ball.y, z, *guide)
+    return (x, ball.y, z, x + ball.arm * s, ball.y - ball.arm * c, height)
 
 
 @inline

@@ -17,7 +17,7 @@ from kernels.arithmetic.complex_step import magnitude, unit_near
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, scale, turned
 from kernels.jit import inline, kernel
 from kernels.linkage import bodies as tree
-from kernels.linkage.driven_ball import Crank, Path, Swung, pin_path, reduce_crank, rotated, swing
+from kernels.linkage.driven_ball import Crank, Path, Swung, crank_pin, pin_path, reduce_crank, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
 from kernels.types import Array, Numbers, Status
 
@@ -35,7 +35,8 @@ class Reduced(NamedTuple):
     point: Vector  # working point in that triad
     a2: float
     b2: float
-    centre: Vector  # crank 2: centre from Os, directions of crank angles 0 and 90 deg
+    shaft2: Vector  # centre of crank 2
+    centre: Vector  # the same from Os; directions of crank angles 0 and 90 deg
     first: Vector
     second: Vector
     cos_offset: float
@@ -66,10 +67,11 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     across = cross(axis, radial)
     point = (dot(tip, radial), dot(tip, across), dot(tip, axis))
     a2, b2 = d[17] * per, d[18] * per
-    centre = (d[19] * per - swings.e, d[20] * per, d[21] * per - o)
+    shaft2 = (d[19] * per, d[20] * per, d[21] * per)
+    centre = (shaft2[0] - swings.e, shaft2[1], shaft2[2] - o)
     st, ct, sb, cb = np.sin(d[22]), np.cos(d[22]), np.sin(d[23]), np.cos(d[23])
     # magnitudes, not the sums themselves: where those cancel, the errors of their parts stay
-    size2 = a2.real + abs((d[19] * per).real) + abs(swings.e.real) + abs(centre[1].real) + abs((d[21] * per).real)
+    size2 = a2.real + abs(shaft2[0].real) + abs(swings.e.real) + abs(centre[1].real) + abs(shaft2[2].real)
     size2 += abs(o.real) + ball_size
     tip_size = abs(tip[0].real) + abs(tip[1].real) + abs(tip[2].real)
     valid = swings.valid and 0.0 < a2.real < 1e140 and 0.0 < b2.real < 1e140 and size2 < 1e140 and tip_size < 1e140
@@ -79,8 +81,8 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     valid = valid and branch2 * branch2 == 1.0 and unit < math.inf
     return Reduced(
         swings, o, radial, across, axis, c2 if hinged else 0.0 * c2, along, point,
-        a2, b2, centre, (ct * cb, ct * sb, -st), (-sb, cb, 0.0 * cb), np.cos(d[24]), np.sin(d[24]), branch2, size2,
-        unit, valid,
+        a2, b2, shaft2, centre, (ct * cb, ct * sb, -st), (-sb, cb, 0.0 * cb), np.cos(d[24]), np.sin(d[24]), branch2,
+        size2, unit, valid,
     )  # fmt: skip
 
 
@@ -176,19 +178,19 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             scale = r.unit + undefined
             path = _carried(r, one, two, r.point)
             put_point(out, i, j, centre, path, scale)
-            put_block(out.joints, i, j, _joints(r, first, second, one, two, v), scale)
+            put_block(out.joints, i, j, _joints(r, second, one, two, u, v), scale)
 
 
 @inline
-def _joints(r: Reduced, first: Path, second: Path, one: Swung, two: Swung, v: float) -> tuple[Any, ...]:
+def _joints(r: Reduced, second: Path, one: Swung, two: Swung, u: float, v: float) -> tuple[Any, ...]:
     """Coordinates x y z of crank pin 1, carrier's ball, crank pin 2 and looper's ball."""
     drive = r.swings
     centre = (drive.e, 0.0 * drive.e, r.o)
     ball, _, _, _ = _carried(r, one, two, (r.c2, 0.0 * r.c2, r.along))
     rocker = (drive.e + drive.c * one.cos, drive.c * one.sin, drive.g)
-    # the height anew: the path's own is taken from the rocker's plane, and adding that again would round twice
-    pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))
-    return (*pin, *rocker, *add(centre, second[0]), *add(centre, ball))
+    # not from Os, which would cost a short crank its digits: the second derivative is the pin's place from its shaft
+    pin2 = mix(1.0, r.shaft2, -1.0, second[2])
+    return (*crank_pin(drive, u, v), *rocker, *pin2, *add(centre, ball))
 
 
 @kernel

@@ -142,6 +142,12 @@ def reduce_crank(d: Any, per: float) -> Crank:
 
 
 @inline
+def crank_pin(r: Crank, u: Any, v: Any) -> Vector:
+    """Crank pin in the frame at (cos phi, sin phi) = (u, v)."""
+    return r.a * u, r.y0 + r.a * (r.ca * v), r.lift - r.a * (r.sa * v)
+
+
+@inline
 def pin_path(r: Crank, u: Any, v: Any) -> Path:
     """Crank pin from the foot of the rocker, (e, 0, g), with its derivatives, at (cos phi, sin phi) = (u, v)."""
     hu, hv, tu, tv = r.a * (r.ca * u), r.a * (r.ca * v), r.a * (r.sa * u), r.a * (r.sa * v)

@@ -45,6 +45,22 @@ def distance(part, first, second):
     return np.linalg.norm(part.joints[second] - part.joints[first], axis=1)
 
 
+@pytest.mark.parametrize(
+    ("name", "crank", "pin"),
+    [
+        ("rssr", "a", "x_b"), ("rssp", "a", "x_b"), ("guide", "a", "x_b"), ("five_link", "a", "x_b"),
+        ("slotted", "a", "x_b"), ("slotted", "a", "x_c"), ("swivel", "a", "x_b"), ("inverted_slider_crank", "a", "x_b"),
+        ("spherical_looper", "a1", "x_b1"), ("spherical_looper", "a2", "x_b2"), ("cylindrical_looper", "a1", "x_b1"),
+    ],
+)  # fmt: skip
+def test_pin_of_a_short_crank_keeps_its_digits(name, crank, pin):
+    # Its place from the shaft is proportional to the crank; a power of two changes no bit of a product.
+    design, phi = example(name), np.linspace(0.1, 6.0, 7)
+    short = sweep.evaluate(name, design | {crank: design[crank] * 2.0**-16}, [pin], phi=phi)
+    whole_length = sweep.evaluate(name, design, [pin], phi=phi)
+    np.testing.assert_allclose(short[pin] * 2.0**16, whole_length[pin], rtol=16 * 2.0**-53)
+
+
 @pytest.mark.parametrize("name", DRAWN)
 def test_links_keep_their_lengths_over_the_turn(name):
     part = whole(name)

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import magnitude
-from kernels.arithmetic.vectors import Vector, add, dot
+from kernels.arithmetic.vectors import Vector, add, cross, dot
 from kernels.families.cylindrical_looper.closure import MOST, Loops, Reduced, chosen, place, reduce_design
 from kernels.families.cylindrical_looper.motion import Outputs, Slide, carried
 from kernels.jit import inline, kernel
-from kernels.linkage.driven_ball import Path, Swung
+from kernels.linkage.driven_ball import Path, Swung, crank_pin, pin_path
 from kernels.linkage.outputs import put_angle, put_block, put_loop, put_point
 from kernels.types import EPS, Numbers, Status
 
@@ -58,10 +58,8 @@ def _solve2(j11: Any, j12: Any, j21: Any, j22: Any, per: Any, p: Any, q: Any) ->
 @inline
 def _square(t: Vector, d: Vector) -> Any:
     """Square of the part of d across t."""
-    along = dot(t, d)
-    size = dot(t, t)
-    rest = dot(d, d) - along * along / size if size.real > 0.0 else dot(d, d)
-    return rest if rest.real > 0.0 else 0.0 * rest
+    across, size = cross(t, d), dot(t, t)
+    return dot(across, across) / size if size.real > 0.0 else dot(d, d)
 
 
 @inline
@@ -141,10 +139,7 @@ def _curve(r: Vector, t: Vector, p1: Any, p2: Any, s2: Any, pin: Vector) -> Vect
 @inline
 def _pins(r: Reduced, o: Fixed, u: float, v: float) -> tuple[Path, Path]:
     """Pins of both cranks from the rocker's foot at s = 0, with three derivatives; (2), (6)."""
-    one, two = r.swings, r.moves
-    hu, hv, tu, tv = one.a * (one.ca * u), one.a * (one.ca * v), one.a * (one.sa * u), one.a * (one.sa * v)
-    pin1 = (one.a * u - one.e, one.y0 + hv, one.lift - one.g - tv)
-    first = pin1, (-one.a * v, hu, -tu), (-one.a * u, -hv, tv), (one.a * v, -hu, tu)
+    two = r.moves
     u2, v2 = u * r.cos_offset - v * r.sin_offset, v * r.cos_offset + u * r.sin_offset
     m, n, y = two.a * u2 - two.e, two.n0 - two.na * v2, two.k0 + two.ka * v2
     second = (
@@ -153,7 +148,7 @@ def _pins(r: Reduced, o: Fixed, u: float, v: float) -> tuple[Path, Path]:
         _about(o, -two.a * u2, two.na * v2, -two.ka * v2),
         _about(o, two.a * v2, two.na * u2, -two.ka * u2),
     )
-    return first, second
+    return pin_path(r.swings, u, v), second
 
 
 @inline
@@ -223,7 +218,8 @@ def coupled_poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: 
         row = i if cos_phi.shape[0] > 1 else 0
         undefined = 0.0 if o.valid else math.nan
         for j in range(cos_phi.shape[1]):
-            first, second = _pins(r, o, cos_phi[row, j], sin_phi[row, j])
+            u, v = cos_phi[row, j], sin_phi[row, j]
+            first, second = _pins(r, o, u, v)
             one, two = _solved(r, o, first, second, at)
             status[i, j] = one.status
             scale = r.unit + undefined
@@ -234,5 +230,5 @@ def coupled_poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: 
             foot = (r.swings.e, 0.0 * r.swings.e, r.swings.g)
             path = carried(r, one, two)
             put_point(out, i, j, foot, path, scale)
-            pin, ball = add(foot, first[0]), (r.swings.c * one.cos, r.swings.c * one.sin, r.slides * two.s)
+            pin, ball = crank_pin(r.swings, u, v), (r.swings.c * one.cos, r.swings.c * one.sin, r.slides * two.s)
             put_block(out.joints, i, j, (*pin, *add(foot, ball)), scale)

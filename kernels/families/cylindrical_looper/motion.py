@@ -17,7 +17,7 @@ from kernels.arithmetic.vectors import add, cross, mix, scale
 from kernels.families.cylindrical_looper.closure import Reduced, reduce_design
 from kernels.jit import inline, kernel
 from kernels.linkage import bodies as tree
-from kernels.linkage.driven_ball import Path, Swung, pin_path, rotated, swing
+from kernels.linkage.driven_ball import Path, Swung, crank_pin, pin_path, rotated, swing
 from kernels.linkage.outputs import has_point, put_angle, put_block, put_loop, put_point
 from kernels.linkage.slider_closure import Reduced as Slider
 from kernels.linkage.slider_closure import derivatives, place, tolerance
@@ -117,7 +117,7 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             foot = (drive.e, 0.0 * drive.e, drive.g)
             path = carried(r, one, two)
             put_point(out, i, j, foot, path, scale)
-            put_block(out.joints, i, j, _joints(r, first, one, two, v), scale)
+            put_block(out.joints, i, j, _joints(r, one, two, u, v), scale)
 
 
 @inline
@@ -146,14 +146,12 @@ def carried(r: Reduced, one: Swung, two: Slide) -> Path:
 
 
 @inline
-def _joints(r: Reduced, first: Path, one: Swung, two: Slide, v: float) -> tuple[Any, ...]:
+def _joints(r: Reduced, one: Swung, two: Slide, u: float, v: float) -> tuple[Any, ...]:
     """Coordinates x y z of crank pin 1 and of the rocker's ball."""
-    # not from the path's own z, which the slide has been taken off
     drive = r.swings
-    pin = (first[0][0] + drive.e, first[0][1], drive.lift - drive.a * (drive.sa * v))
     lift = drive.g + two.s if r.slides == 1.0 else drive.g + 0.0 * drive.e
     ball = (drive.e + drive.c * one.cos, drive.c * one.sin, lift)
-    return (*pin, *ball)
+    return (*crank_pin(drive, u, v), *ball)
 
 
 SHAFT = 2  # its number among the bodies

@@ -9,6 +9,7 @@ from mpmath import mp
 import sweep
 from kernels import status as st
 from kernels.families import cylindrical_looper
+from kernels.families.cylindrical_looper.coupled import _square as across_square
 from sweep.families import family
 from tests.families.cylindrical_looper.test_reference import ALL, NAMES, SHAPES, TABLE, evaluated, loopers
 from tests.reference import cylindrical_looper as naive
@@ -120,6 +121,13 @@ def test_designs_on_and_beside_the_axis_keep_their_order():
     for k, (table, phi) in enumerate(((BESIDE, 0.3), (TABLE, 1.0), (BESIDE, 2.0))):
         alone = sweep.evaluate("cylindrical_looper", table, ["psi", "x_p"], phi=[phi])
         assert (got.loc[k, ["psi", "x_p"]] == alone.loc[0, ["psi", "x_p"]]).all()
+
+
+@pytest.mark.parametrize("small", [1e-3, 1e-6, 1e-9])
+def test_part_of_a_coupler_that_does_no_work_keeps_its_digits_where_it_is_small(small):
+    # As a difference of squares it lost all digits below 1e-8; a quotient of sums of products has a few roundings.
+    way, coupler = (3.0, 0.0, 4.0), (6.0 - 0.8 * small, 0.0, 8.0 + 0.6 * small)
+    assert across_square.py_func(way, coupler) == pytest.approx(small**2, rel=20.0 * 2.0**-53 / small)
 
 
 def test_pressure_angles_say_where_both_loops_lock():
