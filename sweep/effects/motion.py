@@ -102,8 +102,9 @@ def advise(scene: Scene) -> Advice | None:
         rod = given["rod_rocker"] * (inertia + given["line_mass_rocker"] * c) / 3.0
         inertia = (given["j_rocker_zz"] + inertia * square) / c**2 + rod
     off = np.hypot(given["com_coupler_y"], given["com_coupler_z"]) / b
+    coupler = given["m_coupler"] + given["rod_coupler"] * given["line_mass_coupler"] * b
     with np.errstate(divide="ignore", invalid="ignore"):  # without a mass the quotient is not used
-        share = np.where(given["m_coupler"] > 0.0, given["m_coupler"] / inertia, 0.0)
+        share = np.where(coupler > 0.0, coupler / inertia, 0.0)
     return Advice("coupler's mass over the follower's, brought to C, plus its eccentricity", share + off, 0.05)
 
 

@@ -153,7 +153,8 @@ def _read_text(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
             faults.value(key, text, f'"<=" or ">=", or "+-" for a band, as {_side(internal)} or {_band(internal)}')
             return []
     try:
-        number, unit = units.split(rest.strip(), internal) if internal != "1" else (float(rest), "1")
+        bare = internal == "1" and "%" not in rest
+        number, unit = (float(rest), "1") if bare else units.split(rest.strip(), internal)
         factor, centre = units.factor(unit, internal), float(middle) if band else 0.0
     except units.UnitFault as fault:
         faults.value(key, text, str(fault) if band else f"{fault}: {_side(internal)}")

@@ -192,6 +192,27 @@ curves = "none"
 """
 
 
+SYMMETRIC = """
+[study]
+name = "symmetric"
+[mechanism]
+family = "rssr"
+[locus]
+swing = "70 deg"
+phi0 = "185 deg"
+phi_ext = { from = 0, to = 350, count = 11, unit = "deg" }
+[design]
+e = "20 mm"
+f = { from = 100, to = 200, count = 2, unit = "mm" }
+g = "0 mm"
+alpha = "90 deg"
+[objective]
+minimise = "max_abs_d2psi"
+[optimise]
+starts = 1
+"""
+
+
 def test_study_on_a_locus_optimises_along_it_and_agrees_with_its_equations(tmp_path):
     import pandas as pd
 
@@ -213,6 +234,14 @@ def test_study_on_a_locus_optimises_along_it_and_agrees_with_its_equations(tmp_p
     assert along.iloc[0].c <= 60.0 + 1e-6 and along.iloc[0].b <= 120.0 + 1e-6
     # The reference is no design of the locus: it stays itself, and how far it is off is told as ever.
     assert along.iloc[-1].a == 20.0 and along.iloc[-1].violation == raw.iloc[-1].violation > 0.01
+
+
+def test_a_locus_without_a_mechanism_says_so(tmp_path):
+    """With g = 0 and crossed axes every crank-rocker is symmetric, and no other phi0 than 180 degrees exists."""
+    path = tmp_path / "study.toml"
+    path.write_text(SYMMETRIC)
+    with pytest.raises(InputError, match="design space = '22 designs'; allowed: at least one mechanism that .locus"):
+        run(load_study(path), tmp_path / "out", jobs=1)
 
 
 def test_equations_that_say_the_same_are_refused_by_name() -> None:

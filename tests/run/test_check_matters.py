@@ -63,3 +63,18 @@ def test_few_designs_that_keep_the_limits_are_all_taken() -> None:
     assert len(some) == 3 < len(everything)
     assert all((everything == row).all(axis=1).any() for row in some)
     assert np.isfinite(everything).all()
+
+
+def test_a_rod_of_a_material_weighs_in_what_matters_as_the_same_mass_does() -> None:
+    """Not to a rounding: the printed number has three digits."""
+    given, found = {"speed": "600 rpm", "want": ["max_abs_drive_torque"]}, []
+    lengths = {"a": "40 mm", "b": "200 mm", "c": "90 mm", "e": "180 mm", "f": "10 mm", "g": "-5 mm"}
+    design = lengths | {"alpha": {"from": 20.0, "to": 30.0, "count": 3, "unit": "deg"}, "branch": -1}
+    bars = {body: {"material": "steel", "section": "12 mm round"} for body in ("crank", "coupler", "rocker")}
+    of_length = 7.85e-3 * np.pi * 36.0  # g per mm
+    masses = {f"m_{body}": f"{of_length * x} g" for body, x in (("crank", 40.0), ("coupler", 200.0), ("rocker", 90.0))}
+    for bodies in (bars, masses):
+        data = {"study": {"name": "bars"}, "mechanism": {"family": "rssr"}, "scene": given, "design": design}
+        found.append(number(lines_of(study_from_data(data | {"bodies": bodies}, Path("bars"))), "coupler"))
+    # The coupler's mass over a third of the rocker's, which is a rod too: their lengths are 200 and 90 mm.
+    assert found == [6.67, 6.67]

@@ -99,9 +99,12 @@ def test_bound_is_read_as_it_is_written(tmp_path, text, limit) -> None:
             assert written == pytest.approx(wanted, rel=4e-16)  # a product by the factor of the unit
 
 
-def test_bound_of_a_pure_number_has_no_unit(tmp_path) -> None:
-    found = study_of(tmp_path, STUDY.replace('swing = ">= 20 deg"', 'link_ratio = ">= 0.25"'))
-    assert Limit("link_ratio", 0.25, None) in found.limits
+@pytest.mark.parametrize(
+    ("text", "ends"), [(">= 0.25", (0.25, None)), (">= 25 %", (0.25, None)), ("50 +- 25 %", (0.25, 0.75))]
+)
+def test_bound_of_a_pure_number_has_no_unit_or_is_a_percentage(text, ends, tmp_path) -> None:
+    found = study_of(tmp_path, STUDY.replace('swing = ">= 20 deg"', f'link_ratio = "{text}"'))
+    assert Limit("link_ratio", *ends) in found.limits  # of these percentages the factor makes exact numbers
 
 
 @pytest.mark.parametrize(

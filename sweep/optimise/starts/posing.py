@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sweep.errors import InputError, MissingInput
+from sweep.errors import InputError, MissingInput, how_many
 from sweep.families.base import Array
 from sweep.optimise.multistart.multistart import listed
 from sweep.optimise.multistart.survey import StartGroup
@@ -171,6 +171,6 @@ def _designs_and_problem(study: Study, folder: Path) -> tuple[Array, Array, Prob
     if not len(designs) and study.optimise is not None:
         designs = random_designs(study, study.optimise.starts, study.optimise.seed)
     if not len(designs):
-        allowed = "at least one design that [locus] and [fit] can make"
-        raise InputError("design space", study.space.count, allowed, str(study.path))
+        allowed = "at least one mechanism that [locus] and [fit] can make: none was found, so give wider ranges"
+        raise InputError("design space", how_many(study.space.count, "design"), allowed, str(study.path))
     return designs, merit, problem_of(study, designs)
