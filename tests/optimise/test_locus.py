@@ -240,7 +240,7 @@ def test_a_locus_without_a_mechanism_says_so(tmp_path):
     """With g = 0 and crossed axes every crank-rocker is symmetric, and no other phi0 than 180 degrees exists."""
     path = tmp_path / "study.toml"
     path.write_text(SYMMETRIC)
-    with pytest.raises(InputError, match="design space = '22 designs'; allowed: at least one mechanism that .locus"):
+    with pytest.raises(InputError, match="allowed: at least one mechanism that"):
         run(load_study(path), tmp_path / "out", jobs=1)
 
 
