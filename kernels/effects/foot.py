@@ -177,6 +177,19 @@ def _struck(path: Array, foot: Foot, j: int, s: float, speed: float) -> tuple[St
 
 
 @kernel
+def _on_the_other(path: Array, foot: Foot, state: State, j: int, low: float, high: float) -> float:
+    """Find where a rebound ends before it is clear, as the rack passes the plate meanwhile; 2 if it does not."""
+    if not low < high or _measure(high, path, foot, state, j, 2) >= 0.0:
+        return 2.0
+    at_low, at_high = _measure(low, path, foot, state, j, 0), _measure(high, path, foot, state, j, 0)
+    if at_low < 0.0 < at_high or at_high < 0.0 < at_low:
+        low = _root(path, foot, state, j, low, high, 0)
+    elif state.since >= j * (TWO_PI / path.shape[1]):
+        return 2.0  # it comes down on what it left, of which it is surely clear: a hop within rounding
+    return _root(path, foot, state, j, low, high, 2) if _measure(low, path, foot, state, j, 2) > 0.0 else 2.0
+
+
+@kernel
 def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
     """Find the share of the cell at which the state ends, and the measure; 2 and -1 if it lasts beyond the cell."""
     if state.mode == PLATE:
@@ -186,6 +199,9 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
     before = s
     if state.mode == FLIGHT:
         before = max(s, state.clear * (path.shape[1] / TWO_PI) - j)
+        landing = _on_the_other(path, foot, state, j, s, min(before, 1.0))
+        if landing < 1.0:
+            return landing, 2
     for k in range(1, _PARTS + 1):
         after = k / _PARTS
         if after <= before:

@@ -64,6 +64,27 @@ def test_foot_flies_and_lands_where_steps_through_time_say(omega, restitution):
         assert got.phi_land == pytest.approx(big[0][1] % (2.0 * math.pi), abs=1e-9)
 
 
+def test_a_bounce_that_the_rising_rack_cuts_short_ends_where_it_meets_the_foot():
+    """In the third turn the foot bounces on the plate 8e-5 rad before the rack comes through, which then hits it.
+
+    That hit was looked for a quarter of a step later, so all that follows was up to 2e-3 rad off.
+    """
+    p = {"m": 0.04686558890196624, "k": 2490.618000731477, "F0": 7.233372612525972, "omega": 281.0379025384778,
+         "Y": 1.2672484258935707e-3, "p": 7.815235707781273e-4, "restitution": 0.9, "X": 1e-3}  # fmt: skip
+    steps = naive.flights(p, TURNS, 20000)
+    entry = math.asin(p["p"] / p["Y"])
+    ahead = [(entry - a[0] % (2.0 * math.pi), a[1] - a[0]) for a in steps]
+    short = [(before, hop) for before, hop in ahead if 0.0 < before < 1e-4]
+    assert len(short) == 1 and short[0][0] < short[0][1] < 2e-4
+    first = next(a for a in steps if a[0] >= -0.5 * math.pi + (TURNS - 1) * 2.0 * math.pi)
+    got = sweep.summarise("foot", p, ["phi_loss", "phi_land", "flights", "settled"]).iloc[0]
+    # Rounding of 1e-16 grows with every bounce, to 1e-12 after these thirty.
+    assert got.phi_loss == pytest.approx(first[0] % (2.0 * math.pi), abs=1e-10)
+    assert got.phi_land == pytest.approx(first[1] % (2.0 * math.pi), abs=1e-10)
+    assert got.flights == sum(a[0] >= first[0] for a in steps) + 1.0  # the last flight lands in the next turn
+    assert got.settled == 0.0
+
+
 def test_foot_whose_last_hop_is_lower_than_rounding_lies_still_from_there():
     """It fell through the rack to the end of a part of a cell and bounced anew, in 45 of 6000 random feet."""
     p = {"m": 0.40892091432381794, "omega": 475.30429849289357, "Y": 0.0016744970528513358, "p": 0.0,
