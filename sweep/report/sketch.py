@@ -15,17 +15,7 @@ import numpy as np
 
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
-from sweep.exchange.scene import (
-    PlacedPart,
-    exists,
-    extent,
-    first_pose,
-    is_spatial,
-    over,
-    projection,
-    shown_name,
-    side_by_side,
-)
+from sweep.exchange import scene
 from sweep.families.base import Array, Family
 from sweep.pages import rendered
 from sweep.report.dataset import Dataset
@@ -44,27 +34,27 @@ NEAR = 1e-7  # share of the mechanism's size below which a distance equals a dim
 TELLING = 1e-3  # relative change of dimensions that distinguishes equal ones
 
 
-def drawn_parts(family: Family, design: Mapping[str, float]) -> list[PlacedPart]:
+def drawn_parts(family: Family, design: Mapping[str, float]) -> list[scene.PlacedPart]:
     """Return joints and links of a design over one turn, frames side by side; empty without joints or poses."""
     try:
-        parts = over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
+        parts = scene.over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
     except InputError:  # a mechanism without joints has curves only
         return []
-    return side_by_side(parts) if exists(parts) else []
+    return scene.side_by_side(parts) if scene.exists(parts) else []
 
 
-def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[PlacedPart]) -> dict[str, Array]:
+def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[scene.PlacedPart]) -> dict[str, Array]:
     """Return the ends, (2, 3), of the lengths that appear in a position as the distance of two points.
 
     A length is identified by a distance that follows it, when all lengths are changed slightly by different shares.
     """
-    pose = first_pose([stage.part for stage in placed])
+    pose = scene.first_pose([stage.part for stage in placed])
     lengths = [p.name for p in family.parameters if p.unit == "length" and abs(float(design[p.name])) > 0.0]
     changed = {name: float(design[name]) * (1.0 + TELLING * (k + 1) / len(lengths)) for k, name in enumerate(lengths)}
     other = drawn_parts(family, {**design, **changed})
     if len(other) != len(placed):
         return {}
-    tolerance = NEAR * extent([stage.part for stage in placed])
+    tolerance = NEAR * scene.extent([stage.part for stage in placed])
     ends: dict[str, Array] = {}
     for stage, changed_stage in zip(placed, other, strict=True):
         points, moved = _points(stage.part, pose), _points(changed_stage.part, pose)
@@ -95,8 +85,8 @@ def _points(part: Part, pose: int) -> dict[str, Array]:
 
 
 def sketch(
-    placed: Sequence[PlacedPart], title: str, dimensions: Mapping[str, Array] | None = None, *, names: bool = True,
-    span: float = 0.0,
+    placed: Sequence[scene.PlacedPart], title: str, dimensions: Mapping[str, Array] | None = None, *,
+    names: bool = True, span: float = 0.0,
 ) -> Markup:  # fmt: skip
     """Draw a mechanism as SVG in the colours of the page, from a corner if it is spatial, otherwise from the front.
 
@@ -106,7 +96,7 @@ def sketch(
         replace(one.part, joints={name: path + one.shift for name, path in one.part.joints.items()}) for one in placed
     ]
     flat = np.vstack([path for part in parts for path in part.joints.values()])
-    view = projection("space" if is_spatial([one.part for one in placed]) else "xy")
+    view = scene.projection("space" if scene.is_spatial([one.part for one in placed]) else "xy")
     flat = flat[np.isfinite(flat).all(axis=1)] @ view.T
     low, wide = flat.min(axis=0), np.ptp(flat, axis=0)
     scale = (WIDE - 2.0 * ROOM) / max(float(wide[0]), float(wide[1]) / 0.8, span, 1e-300)
@@ -115,7 +105,7 @@ def sketch(
         x, y = ((points @ view.T - low) * scale).T
         return np.column_stack([x + ROOM, float(wide[1]) * scale + ROOM - y])
 
-    pose, steps = first_pose(parts), parts[0].phi.size - 1
+    pose, steps = scene.first_pose(parts), parts[0].phi.size - 1
     turned = [(pose + round(k * steps / (FAINT + 1))) % steps for k in range(FAINT, -1, -1)]
     lines: list[tuple[str, str]] = []
     marks: list[tuple[str, float, float]] = []
@@ -124,7 +114,7 @@ def sketch(
         for name, path in part.joints.items():
             if name not in part.kinds:
                 lines.append(("path", _line(at(path))))
-        reach = 0.12 * extent(parts)
+        reach = 0.12 * scene.extent(parts)
         for name, axis in part.axes.items():
             lines.append(("axis", _line(at(part.joints[name][pose] + np.outer([-reach, reach], axis)))))
     for k in turned:
@@ -148,7 +138,7 @@ def sketch(
             ((x, y),) = at(path[[pose]]).tolist()
             marks.append(("pivot" if name in part.kinds else "joint", x, y))
             if names and len(members) <= FEW:
-                _write(labels, x, y, f"{shown_name(name)}{part.stage}", "name")
+                _write(labels, x, y, f"{scene.shown_name(name)}{part.stage}", "name")
     size = (WIDE, float(wide[1]) * scale + 2.0 * ROOM)
     return rendered("sketch.svg", title=title, size=size, lines=lines, marks=marks, labels=labels)
 
@@ -189,7 +179,7 @@ def bars(data: Dataset) -> list[Bar]:
     if row is None or not rods:
         return []
     placed = drawn_parts(family, {name: value_of(row, name) for name in family.parameter_names})
-    pose, lengths = first_pose([one.part for one in placed]) if placed else 0, {}
+    pose, lengths = scene.first_pose([one.part for one in placed]) if placed else 0, {}
     for part in (one.part for one in placed):
         for link in (link for link in part.links if len(link.joints) > 1):
             first, second = (part.joints[name][pose] for name in link.joints[:2])
