@@ -201,3 +201,19 @@ def test_a_large_flywheel_evens_the_speed_and_the_estimate_is_right():
     ratio = got["unevenness"].to_numpy()[:-1] / got["unevenness"].to_numpy()[1:]
     assert ratio == pytest.approx(10.0, rel=0.03)
     np.testing.assert_allclose(got["max_crank_speed"], got["fastest"], rtol=1e-12)
+
+
+@pytest.mark.parametrize(("family", "geometry", "bodies", "along", "friction"), [
+    ("rssr", RSSR, ("crank", "coupler", "rocker"), "moment_d{}_z", "shaft_torque_d"),
+    ("rssp", RSSP, ("crank", "coupler", "slider"), "force_d{}_y", "slide_friction"),
+])  # fmt: skip
+def test_follower_bearing_takes_only_friction_where_the_follower_moves(family, geometry, bodies, along, friction):
+    table = {**geometry, **loads(bodies), "support_d1": -30.0, "support_d2": 30.0, "support_a1": -30.0}
+    table |= {"support_a2": 30.0} | {f"mu_{x}": 0.1 for x in "abcd"}
+    table |= {f"radius_{x}": 8.0 for x in ("abcd" if family == "rssr" else "abc")}
+    plain, rubbing = along.format(""), along.format("_friction")
+    found = sweep.evaluate(family, table, [plain, rubbing, friction], phi=PHI[::16])
+    assert (found["status"] == st.OK).all()
+    assert (found[plain] == 0.0).all()  # as a difference of all loads it was 1e-13 of them
+    assert (found[friction].abs() > 0.01).all()
+    np.testing.assert_allclose(found[rubbing], found[friction], rtol=4 * 2.0**-53)  # one more sum
