@@ -237,7 +237,7 @@ def solve(
     r_d = mix(1.0, sub(on.f3, r_c), -(1.0 - j.turns) * on.torque, j.tau)
     arm, load = j.turns * j.c, j.turns * on.torque
     m_d = add(sub(sub(moment3, scale(arm, cross(j.rho, r_c))), scale(load, j.k)), add(e_c, scale(on_rocker, q)))
-    # The bearing takes nothing but friction in the direction of motion; as a difference of all loads this has no digits.
+    # A bearing takes nothing but friction in the direction of motion; as a difference of all loads it had no digits.
     m_d = add(m_d, scale(j.turns * (t_d - dot(m_d, j.k)), j.k))
     r_d = add(r_d, scale((1.0 - j.turns) * (t_d - dot(r_d, j.tau)), j.tau))
     r_a = add(on.f1, r_b)
