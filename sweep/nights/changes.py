@@ -69,6 +69,12 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
     return values, units
 
 
+def _asked(plan: Mapping[str, Any]) -> list[str]:
+    """Fingerprints of a study: without what follows the sweep, and the whole one if an optimum follows."""
+    # the key of an optimum is identity, fingerprint and sources (`sweep.engine.searches.optimum_key`)
+    return [str(plan.get("study")), *str(plan.get("optimised") or "").split("-")[1:2]]
+
+
 def changes(study: Study, old: Path, new: Path) -> Changes:
     """Compare a study's dataset with that of an earlier night.
 
@@ -81,7 +87,7 @@ def changes(study: Study, old: Path, new: Path) -> Changes:
     old, new : folders of the chunks, both complete
     """
     plans = [files.read_plan(folder) or {} for folder in (old, new)]
-    if plans[0].get("study") != plans[1].get("study"):
+    if _asked(plans[0]) != _asked(plans[1]):
         words = differences(plans[0].get("data") or {}, plans[1].get("data") or {})
         edit = f"the study itself was edited: {'; '.join(words) or 'its fixed tables'}"
         return Changes(ROWS_CHANGED, (edit,), edited=True)

@@ -255,6 +255,18 @@ def test_an_edited_study_is_said_with_its_edit(tmp_path: Path) -> None:
     assert "the study itself was edited: design.e 90 mm -> 91 mm" in found.lines
 
 
+def test_an_edit_of_what_follows_the_sweep_is_said_too(tmp_path: Path) -> None:
+    folders = []
+    for lengths in (0.02, 0.03):
+        path = written(tmp_path / "one") / "study.toml"
+        after = f'[optimise]\nstarts = 1\n[tolerance]\nsamples = 64\nlengths = "{lengths} mm"\n'
+        path.write_text(path.read_text() + after)
+        folders.append(sweep.run(path, tmp_path / f"{lengths}" / "designs", jobs=1))
+    found = changes(load_study(path), *folders)
+    assert found.code == 11 and found.edited
+    assert "the study itself was edited: tolerance.lengths 0.02 mm -> 0.03 mm" in found.lines
+
+
 def test_retention_keeps_the_last_good_night_however_old(tmp_path: Path) -> None:
     names = [f"2026-01-{day:02d}T00-00-00Z" for day in range(1, 8)]
     for name in names:
