@@ -303,24 +303,6 @@ def test_a_table_that_must_be_there(table: str, tmp_path: Path) -> None:
     assert f"study.toml: {table} is missing; needed: a table [{table}]" in faults_of("\n[".join(blocks), tmp_path)
 
 
-SAMPLED = RIGHT.replace(", count = 5", "").replace(", count = 4", "")
-
-
-@pytest.mark.parametrize(
-    ("sample", "pieces"),
-    [
-        ('{ kind = "halton", n = 8 }', ["design.sample.kind = 'halton'", '"sobol"']),
-        ('{ kind = "sobol" }', ["design.sample.n is missing", "whole number"]),
-        ('{ kind = "sobol", n = 0 }', ["design.sample.n = 0", "1 to 2^40"]),
-        ('{ kind = "sobol", n = 8, sed = 1 }', ["design.sample.sed: unknown key", "did you mean 'seed'?"]),
-        ("8", ["design.sample = 8", "a table with the keys kind, n, seed"]),
-    ],
-)
-def test_faults_of_a_sample(sample: str, pieces: list[str], tmp_path: Path) -> None:
-    (message,) = faults_of(SAMPLED.replace("[design]", f"[design]\nsample = {sample}"), tmp_path)
-    assert all(piece in message for piece in pieces)
-
-
 def test_an_optimiser_needs_something_to_vary(tmp_path: Path) -> None:
     axes = {A_AXIS: 'c = "20 mm"', "[35.0, 40.0]": "[35.0]", "from = 0, to = 90, count = 4": "value = 0"}
     text = RIGHT
@@ -332,22 +314,6 @@ def test_an_optimiser_needs_something_to_vary(tmp_path: Path) -> None:
     assert "optimise = 'no swept parameter'" in faults_of(text.replace("[35.0]", "[35.0, 36.0]"), tmp_path)[0]
     (tmp_path / "study.toml").write_text(text.replace("values = [35.0]", "from = 35.0, to = 36.0, count = 2"))
     assert load_study(tmp_path).space.count == 4
-
-
-def test_a_sampled_axis_has_no_count(tmp_path: Path) -> None:
-    text = SAMPLED.replace("[design]", '[design]\nsample = { kind = "sobol", n = 8 }').replace(
-        "= 40, unit", "= 40, count = 5, unit"
-    )
-    (message,) = faults_of(text, tmp_path)
-    assert "design.c.count = 5; allowed: no count beside design.sample" in message
-
-
-def test_a_sample_needs_an_axis(tmp_path: Path) -> None:
-    text = RIGHT.replace(A_AXIS, 'c = "30 mm"').replace('{ values = [35.0, 40.0], unit = "mm" }', '"40 mm"')
-    text = text.replace('alpha = { from = 0, to = 90, count = 4, unit = "deg" }', 'alpha = "90 deg"')
-    text = text.replace("branch = { values = [-1, 1] }", 'sample = { kind = "sobol", n = 8 }')
-    (message,) = faults_of(text, tmp_path)
-    assert "design.sample = '0 swept parameters'" in message
 
 
 def test_too_many_designs(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from kernels import status as st
 from kernels.effects.foot import OUTPUTS
 from kernels.effects.foot_fabric import march
 from sweep.families.foot import NODES, TURNS, path_of
-from tests.families.foot.test_reference import HEAVY, RACK
+from tests.families.foot.test_feed_rack import RACK
+from tests.families.foot.test_reference import HEAVY
 from tests.support.selection import mostly_long
 
 PHI = np.arange(NODES) * (2.0 * math.pi / NODES)
