@@ -28,13 +28,16 @@ class Assembly:
 
     ``discriminant`` is the pose output that is negative where the links do not reach; it is a smooth function of the
     crank angle whatever its sign.  Divided by ``scale(designs)``, (n,), it is the squared cosine of the pose output
-    ``pressure_angle`` wherever the links reach.  In a chain ``stage`` is the number of the stage.
+    ``pressure_angle`` wherever the links reach.  In a chain ``stage`` is the number of the stage.  A motion may also
+    end where the discriminant is not zero: ``end`` has a pose output that is extreme there, and a mask (n,) of the
+    designs where that can happen.
     """
 
     discriminant: str
     pressure_angle: str
     scale: DesignMap
     stage: str = ""
+    end: tuple[str, DesignMap] | None = None
 
 
 def constant(*numbers: float) -> DesignMap:

@@ -161,6 +161,7 @@ def _loops(stage: Stage) -> list[Assembly]:
             f"{loop.pressure_angle}{stage.number}",
             partial(on_part, stage.designs, loop.scale),
             f"{loop.stage}{stage.number}",
+            loop.end and (f"{loop.end[0]}{stage.number}", partial(on_part, stage.designs, loop.end[1])),
         )
         for loop in stage.family.every(Assembly)
     ]

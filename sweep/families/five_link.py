@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kernels.families import five_link
 from kernels.families.five_link.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Family, Output, Parameter
+from sweep.families.base import Array, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Link, OutputLink, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
@@ -61,6 +63,13 @@ LINKS = LinkTree(
     output=3,
 )
 
+
+def _may_stand(designs: Array) -> Array:
+    """Whether the ball's height above the crank plane can reach b, with the coupler parallel to the crank axis."""
+    b, c, f, g, alpha = designs[:, [1, 2, 4, 5, 6]].T
+    return np.asarray(c * np.abs(np.sin(alpha)) + np.abs(g * np.cos(alpha) - f) >= b)
+
+
 FAMILY = Family(
     name="five_link",
     title="five-link with two revolutes at the crank pin",
@@ -74,7 +83,7 @@ FAMILY = Family(
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")},
     capabilities=(
         CRANK_ROCKER_SIZES,
-        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale),
+        Assembly("discriminant", "pressure_angle", crank_rocker.discriminant_scale, end=("beta", _may_stand)),
         OutputLink(standing(PARAMETERS, "e").at),
         LINKS,
         Skeleton(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from kernels import status as st
-from kernels.types import TWO_PI
+from kernels.types import TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step
 from sweep.families.capabilities import Assembly
 from sweep.families.names import is_flag
-from sweep.numerics.records import put
+from sweep.numerics.records import Indices, put
 from sweep.quantities.dimensions import near_unit_size
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
@@ -20,6 +20,7 @@ NAMES = ("rotatable", "margin", "max_pressure_angle")
 TRANSMISSION = "least_transmission_angle"
 # Relative accuracy of the smallest discriminants unless a finer one is asked for: their sign is what matters.
 TARGET = 1e-10
+END_TARGET = 1e-4  # of the search for the end of a motion, which only has to meet the missing poses
 FEW = 16  # number of poses that identify most non-rotatable designs
 
 
@@ -141,6 +142,8 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target
     at_least = DESIGN_STATUS[state[:, 0]]
     # A discriminant with nan in it: the status of those poses gives the reason.
     status = np.where(known, at_least, np.where(unknown == st.OK, st.NOT_CONVERGED, unknown)).astype(np.uint8)
+    ended = _ended(family, designs, loop, status)
+    status[ended], least.value[ended], least.err[ended] = st.NOT_ROTATABLE, np.nan, np.nan
     turns = status == st.OK
     scale = loop.scale(designs)
     pressure = np.where(turns, poses[angle][:, 0], np.nan)
@@ -157,6 +160,16 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target
         f"err_max_pressure_angle{suffix}": np.where(turns, err_angle, np.nan),
         "status": status,
     }
+
+
+def _ended(family: Family, designs: Array, loop: Assembly, status: Status) -> Indices:
+    """Find designs that turn by their discriminant, but whose motion ends where that is not zero."""
+    if loop.end is None or loop.end[0] not in family.pose_names:
+        return np.zeros(0, np.intp)
+    pose, possible = loop.end
+    rows = np.flatnonzero((status == st.OK) & possible(designs).astype(bool))
+    _, met = true_extrema(family, designs[rows], [Request(pose, 0)], END_TARGET)
+    return rows[np.isin(met, (st.NOT_ROTATABLE, st.SINGULAR))]
 
 
 def _apart(family: Family, designs: Array, discriminant: str, looked: int) -> Extremum:

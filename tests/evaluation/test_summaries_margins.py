@@ -212,3 +212,25 @@ def test_error_of_the_margin_meets_a_target_of_1e_12(name):
     assert found.status == st.OK
     assert found.err_margin <= 1e-12 * found.margin
     assert found.err_max_pressure_angle <= 1e-12 * found.max_pressure_angle
+
+
+@pytest.mark.parametrize(
+    ("coupler", "turns"), [(2.47, True), (2.4775812395237153, False), (2.48, False), (2.49, False)]
+)
+@pytest.mark.parametrize("mechanism", ["five_link", ["five_link", "rssp"], {"m": {"family": "five_link", "ratio": -1}}])
+def test_a_five_link_whose_coupler_comes_to_stand_along_the_crank_axis_does_not_turn(mechanism, coupler, turns):
+    """Its motion ends where the discriminant is 79, not 0: rotatable was true with a gap of up to 0.1 rad."""
+    link = {"a": 0.5661188035137457, "b": coupler, "c": 2.8914465417692554, "e": -1.486243557626949,
+            "f": -0.4606248574445999, "g": 0.24397883068695592, "alpha": 1.137804718078769, "h": 0.25391672875457516,
+            "s2": -0.05427957741596856}  # fmt: skip
+    angles = np.arange(0.9, 0.96, 1e-4) if coupler < 2.48 else np.linspace(0.0, 2.0 * np.pi, 4000)
+    assert (sweep.evaluate("five_link", link, ["psi"], phi=angles)["status"] == st.OK).all() == turns
+    table, name = link, "rotatable"
+    if isinstance(mechanism, list):
+        table = {f"{p}1": x for p, x in link.items()} | {"a2": 0.1, "b2": 5.0, "e2": 0.0, "f2": 0.0, "alpha2": 0.0}
+        name = "rotatable1"
+    if isinstance(mechanism, dict):
+        table = {f"m.{p}": x for p, x in link.items()}
+    found = sweep.summarise(mechanism, table, [name, name.replace("rotatable", "margin")]).iloc[0]
+    assert bool(found[name]) == turns and found.status == (st.OK if turns else st.NOT_ROTATABLE)
+    assert (found.iloc[1] > 0.1) if turns else np.isnan(found.iloc[1])

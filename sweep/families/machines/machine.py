@@ -169,6 +169,7 @@ def _loop(member: Member, loop: Assembly) -> Assembly:
     return Assembly(
         f"{member.name}.{loop.discriminant}", f"{member.name}.{loop.pressure_angle}",
         partial(on_part, member.designs, loop.scale), f"{member.name}.{loop.stage}",
+        loop.end and (f"{member.name}.{loop.end[0]}", partial(on_part, member.designs, loop.end[1])),
     )  # fmt: skip
 
 
