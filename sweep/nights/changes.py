@@ -31,7 +31,7 @@ OBJECTIVE_RTOL, DIMENSION_RTOL = 1e-6, 1e-4
 # slower if it takes this multiple of the median of earlier nights, twice in a row, with enough nights.
 SLOWER_FACTOR, LEAST_NIGHTS, MOST_NIGHTS = 1.5, 3, 7
 
-DESIGNS, WITHIN, YIELD = "designs", "designs within all limits", "yield"
+DESIGNS, WITHIN, SHARE = "designs", "designs within all limits", "share within all limits"
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ def figures(study: Study, folder: Path) -> tuple[dict[str, float], dict[str, str
     plan = files.read_plan(folder) or {}
     counts = plan.get("counts") or {}
     number, within = sum(counts.values()), counts.get("OK", 0)
-    values: dict[str, float] = {DESIGNS: number, WITHIN: within, YIELD: within / number if number else 0.0}
-    units = {DESIGNS: "", WITHIN: "", YIELD: ""}
+    values: dict[str, float] = {DESIGNS: number, WITHIN: within, SHARE: within / number if number else 0.0}
+    units = {DESIGNS: "", WITHIN: "", SHARE: ""}
     if study.objective is None:
         return values, units
     name = study.objective.output
@@ -99,20 +99,20 @@ def changes(study: Study, old: Path, new: Path) -> Changes:
     code = ROWS_CHANGED if comparison.rows_changed else VALUES_CHANGED if comparison.values_changed else 0
     moved = [name for name, column in comparison.moved.items() if column.changed or column.missing]
     lines = comparison.lines() if code else []
-    for further, names in (_yield(plans), _optimum(study, old, new), _front(study, old, new)):
+    for further, names in (_counts(plans), _optimum(study, old, new), _front(study, old, new)):
         lines += further
         moved += names
         code = code or (VALUES_CHANGED if further else 0)
     return Changes(code, tuple(lines), tuple(dict.fromkeys(moved)))
 
 
-def _yield(plans: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[str]]:
+def _counts(plans: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[str]]:
     old, new = (plan.get("counts") or {} for plan in plans)
     if old == new:
         return [], []
     words = [f"{n} {old.get(n, 0)} -> {new.get(n, 0)}" for n in sorted({*old, *new}) if old.get(n, 0) != new.get(n, 0)]
-    names = [WITHIN, YIELD] if old.get("OK", 0) != new.get("OK", 0) else []
-    return [f"yield moved, designs by status: {', '.join(words)}"], names
+    names = [WITHIN, SHARE] if old.get("OK", 0) != new.get("OK", 0) else []
+    return [f"designs by status moved: {', '.join(words)}"], names
 
 
 def _optimum(study: Study, old: Path, new: Path) -> tuple[list[str], list[str]]:

@@ -12,7 +12,7 @@ import numpy as np
 from sweep.dataset.comparison import SLOWER
 from sweep.dataset.files import write_atomically
 from sweep.nights.archive import WORDS, NightRecord, StudyRecord, read_history
-from sweep.nights.changes import YIELD
+from sweep.nights.changes import SHARE
 from sweep.pages import rendered
 from sweep.report.quantities import number, quantity
 
@@ -71,7 +71,7 @@ def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[s
 
     def shown(record: StudyRecord) -> str:
         value, unit = record.figures[name], record.units.get(name, "")
-        if name == YIELD:
+        if name == SHARE:
             return f"{number(100.0 * value, DIGITS)}\u00a0%"
         return quantity(name, unit).show(value, DIGITS) if unit else number(value, DIGITS)
 

@@ -196,6 +196,7 @@ def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults
     raw = data.get("mechanism")
     if isinstance(raw, dict) and "family" in raw and "chain" in raw:
         faults.value(("mechanism", "chain"), raw["chain"], "either family or chain, not both")
+        return ()  # which of them the other tables describe is not known
     if isinstance(raw, dict) and "family" not in raw and "chain" not in raw:
         faults.missing(("mechanism", "family"), f"one of {', '.join(NAMES)}; or chain, a list of them", instead="chain")
     if section.family is not None:

@@ -78,7 +78,7 @@ FAULTS = {
     "unknown table": ("[limits]", "[limit]", ["limit: unknown table", "did you mean 'limits'?"]),
     "unknown key": ("title =", "titel =", ["study.titel", "did you mean 'title'?"]),
     "unknown family": ('"rssr"', '"rsrs"', ["mechanism.family = 'rsrs'", "did you mean 'rssr'?"]),
-    "family and chain": ('"rssr"', '"rssr"\nchain = ["rssr"]', ["mechanism.chain", "not both"]),
+    "family and chain": ('"rssr"', '"rssr"\nchain = ["rssr", "guide"]', ["mechanism.chain", "not both"]),
     "no family": ('family = "rssr"', "", ["mechanism.family is missing", "rssr"]),
     "chain as a family": ('"rssr"', '"rssr+guide"', ['chain = ["rssr", "guide"]']),
     "empty chain": ('family = "rssr"', "chain = []", ["mechanism.chain = []", "a list of names"]),
