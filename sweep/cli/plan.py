@@ -243,7 +243,7 @@ def _effects(study: Study, sample: Pilot) -> list[str]:
     designs, tried = spread_rows(sample.kept, ADVISED), sample.tried
     if not len(designs):
         designs, tried = feasible_designs(study, ADVISED)
-    which = f"by {how_many(len(designs), 'design')} within all limits, of {tried} tried"
+    which = f"by {how_many(len(designs), 'design')} within all limits"
     if not len(designs):
         designs = spread_designs(study, ADVISED)
         which = f"by {how_many(len(designs), 'design')} spread over the space: none of {tried} tried keeps all limits"
