@@ -54,9 +54,13 @@ class Margin(_Meaning):
 
 @dataclass(frozen=True)
 class LimitPosition(_Meaning):
-    """Quantity of the two limit positions of a follower: swing, stroke, phi0, psi_ext ..., selected by ``kind``."""
+    """Quantity of the two limit positions of a follower: swing, stroke, phi0, psi_ext ..., selected by ``kind``.
+
+    ``cycles`` is the number of times that the follower goes from the one to the other and back in a turn.
+    """
 
     kind: str
+    cycles: int = 1
 
 
 @dataclass(frozen=True)

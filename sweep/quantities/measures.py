@@ -59,6 +59,7 @@ class Measure:
 
     ``parts`` are the two angles of a "difference" (second minus first), the measure that "minus" negates, or the event
     at which a "scalar" takes the value of the pose output ``of``.
+    ``cycles`` is that of :class:`~sweep.quantities.kinds.LimitPosition`.
     ``numbers`` are plain numbers instead of series: the output itself ("scalar"), the parameters of which the largest
     magnitude is taken ("lengths"), or the pieces of which the minimum ("least") or maximum ("most") is taken;
     ``pieces`` computes the latter.
@@ -73,6 +74,12 @@ class Measure:
     parts: tuple[Measure, ...] = ()
     pieces: tuple[DesignFunction, ...] = ()
     of: str = ""
+    cycles: int = 1
+
+    @property
+    def cycle(self) -> float:
+        """Crank angle from an extended position to the next one."""
+        return 2.0 * math.pi / self.cycles
 
     @property
     def is_angle(self) -> bool:
@@ -112,7 +119,7 @@ class Measure:
         if self.inner == "transmission":
             return math.sin(value) ** 2
         if self.inner == "ratio":
-            return 2.0 * math.pi * value / (1.0 + value)
+            return self.cycle * value / (1.0 + value)
         if self.inner == "rotatable":
             return ROTATABLE_MARGIN * value
         if self.inner == "square":
@@ -129,7 +136,7 @@ class Measure:
         if self.inner == "transmission":
             return math.atan2(math.sqrt(value), math.sqrt(max(1.0 - value, 0.0))) if value >= 0.0 else math.nan
         if self.inner == "ratio":
-            return value / (2.0 * math.pi - value)
+            return value / (self.cycle - value)
         if self.inner == "rotatable":
             return 1.0 if value > 0.0 else 0.0
         if self.inner == "square":
@@ -145,7 +152,7 @@ class Measure:
         if self.inner == "transmission":  # inner = sin^2 of the angle
             return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), 1e-300)))
         if self.inner == "ratio":
-            return 2.0 * math.pi / (2.0 * math.pi - inner) ** 2
+            return self.cycle / (self.cycle - inner) ** 2
         if self.inner == "square":
             return 0.5 / math.sqrt(abs(inner)) if inner else math.nan
         return 1.0
@@ -202,7 +209,7 @@ def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[
             return _of_margin(name, kind, margins(family, quantity.stage))
         case kinds.LimitPosition(kind=kind):
             ratio: Inner = "ratio" if kind == "stroke_ratio" else "same"
-            return Measure(name, LIMIT_KINDS[kind], (curve(family, quantity.of),), ratio)
+            return Measure(name, LIMIT_KINDS[kind], (curve(family, quantity.of),), ratio, cycles=quantity.cycles)
         case kinds.Reduced(reduction=reduction, extreme=True):
             inside = window if family.pose_output[quantity.of].windowed else None
             # A vector's length has no slope at zero: its largest value is bounded by both signs, like a magnitude.

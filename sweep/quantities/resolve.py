@@ -140,8 +140,11 @@ def _of_member(machine: Machine, name: str, member: Member, own: str) -> kinds.Q
     named = replace(found.output, name=name, text=f"{member.name}: {found.output.text}")
     named = point.output if point else named
     if kinds.group_of(member.family, found) is not None:
-        of = found.of and f"{member.name}.{found.of}"
-        return replace(found, output=named, of=of, stage=f"{member.name}.{found.stage}")
+        placed = replace(found, of=found.of and f"{member.name}.{found.of}", stage=f"{member.name}.{found.stage}")
+        if isinstance(placed, kinds.LimitPosition) and placed.kind in ("phi0", "stroke_ratio") and member.cycles > 1:
+            placed = replace(placed, cycles=member.cycles)
+            named = replace(named, text=f"{named.text}, with 2 pi/{member.cycles}, a turn of its crank, for 2 pi")
+        return replace(placed, output=named)
     match found:
         case kinds.Extent() | kinds.Dimension():
             whole = _from_dimensions(machine, name)

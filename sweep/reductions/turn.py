@@ -178,10 +178,10 @@ def _value(family: Family, designs: Array, one: Quantity, found: Extrema, window
         case Reduced() | LimitPosition(kind="stroke"):
             (least,) = others
             return first.value - least.value, first.err + least.err
-        case LimitPosition(kind=kind):
+        case LimitPosition():
             (least,) = others
             outward = _extended_is_largest(family, designs, one.of)
-            return _limit(kind, family.pose_output[one.of].wraps, first, least, outward)
+            return _limit(one, family.pose_output[one.of].wraps, first, least, outward)
         case _:
             raise TypeError(f"{one.output.name} is not made of extrema")
 
@@ -194,11 +194,12 @@ def _extended_is_largest(family: Family, designs: Array, position: str) -> Mask:
     return designs[:, family.parameter_names.index(sign)] > 0.0
 
 
-def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
+def _limit(one: LimitPosition, wraps: bool, most: Extremum, least: Extremum, outward: Mask) -> tuple[Array, Array]:
     """Compute a quantity of the two limit positions; ``wraps`` for a position that is an angle.
 
     ``outward`` (n,) tells where the largest position is the extended one.
     """
+    kind, cycle = one.kind, TWO_PI / one.cycles
     ext = Extremum(*(np.where(outward, a, b) for a, b in zip(most, least, strict=True)))
     fold = Extremum(*(np.where(outward, b, a) for a, b in zip(most, least, strict=True)))
     if kind in ("ext", "fold"):
@@ -209,11 +210,11 @@ def _limit(kind: str, wraps: bool, most: Extremum, least: Extremum, outward: Mas
         return end.phi, end.err_phi
     if kind == "swing":
         return fold.value - ext.value, ext.err + fold.err
-    phi0, err_phi0 = np.mod(fold.phi - ext.phi, TWO_PI), ext.err_phi + fold.err_phi
+    phi0, err_phi0 = np.mod(fold.phi - ext.phi, cycle), ext.err_phi + fold.err_phi
     if kind == "phi0":
         return phi0, err_phi0
     assert kind == "stroke_ratio"
-    return phi0 / (TWO_PI - phi0), err_phi0 * TWO_PI / (TWO_PI - phi0) ** 2
+    return phi0 / (cycle - phi0), err_phi0 * cycle / (cycle - phi0) ** 2
 
 
 def _principal(angle: Array) -> Array:

@@ -13,6 +13,7 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.quantities.limits import meets
+from sweep.quantities.measures import measure
 
 NEEDLE = {
     "a1": 9.16, "b1": 18.31, "c1": 10.66, "e1": 13.4, "f1": -14.68, "g1": 0.0, "alpha1": 1.5, "branch1": 1.0,
@@ -113,6 +114,26 @@ def test_phase_turns_the_places_and_ratio_the_derivatives() -> None:
     slow = sweep.summarise("rssr", LOOPER, ["max_abs_d2psi", "swing"], accuracy=1e-8)
     assert fast["looper.max_abs_d2psi"][0] == pytest.approx(4.0 * slow["max_abs_d2psi"][0], rel=1e-8)
     assert fast["looper.swing"][0] == pytest.approx(slow["swing"][0], rel=1e-8)
+
+
+@pytest.mark.parametrize("ratio", [2, -2, 3])
+def test_strokes_of_a_geared_member_take_the_times_of_its_own_crank(ratio: int) -> None:
+    """Wherever the turn begins; backwards the strokes change places. To ten times the errors, which are roundings."""
+    names = ["phi0", "stroke_ratio"]
+    alone = sweep.summarise("rssr", LOOPER, names, accuracy=1e-9).iloc[0]
+    angle, times = (alone[name] for name in names)
+    angle, times = (angle, times) if ratio > 0 else (2.0 * np.pi - angle, 1.0 / times)
+    geared = sweep.machine({"looper": {"family": "rssr", "ratio": ratio}})
+    for offset in (0.0, 1.0, 3.0, 5.0):
+        table = {f"looper.{k}": x for k, x in LOOPER.items()} | {"looper.offset": offset}
+        found = sweep.summarise(geared, table, [f"looper.{name}" for name in names], accuracy=1e-9).iloc[0]
+        for name, expected in zip(names, (angle / abs(ratio), times), strict=True):
+            assert found["status"] == 0
+            assert found[f"looper.{name}"] == pytest.approx(expected, abs=10.0 * found[f"err_looper.{name}"])
+            assert found[f"err_looper.{name}"] < 1e-12
+        ratio_of_times = measure(geared, "looper.stroke_ratio")  # what the optimiser takes for it
+        assert ratio_of_times.from_inner(found["looper.phi0"]) == pytest.approx(times, rel=1e-12)
+        assert ratio_of_times.to_inner(times) == pytest.approx(found["looper.phi0"], rel=1e-12)
 
 
 @pytest.mark.parametrize("how", [{"accuracy": 1e-9}, {"samples": 1024}])

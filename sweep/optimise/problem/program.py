@@ -218,7 +218,7 @@ class _Layout:
             end = limit_points[m.kind.removeprefix("phi_")]
             return [({count + end: 1.0}, self._turn_shift(end))]
         difference = self.points.phi[fold] - self.points.phi[ext]
-        return [({count + fold: 1.0, count + ext: -1.0}, -2.0 * math.pi * math.floor(difference / (2.0 * math.pi)))]
+        return [({count + fold: 1.0, count + ext: -1.0}, -m.cycle * math.floor(difference / m.cycle))]
 
     def _first_tie(self, extrema: list[int]) -> list[int]:
         """Return, as a list of one, the first of the equally high ends in the turn, which defines the place."""
