@@ -106,7 +106,7 @@ def _optimum(data: Dataset) -> list[str]:
     ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
     return [
         f"optimum: {objective.words} {objective.show(value)}{f' ({fast})' if fast else ''}",
-        f"held back by: {held_back(held, ended)}",
+        f"held back by: {held_back(held, ended, settled=not unsettled(data.optimum))}",
         *(
             [f"as it is made: {share_words(share, data.study.wanted_yield, ended, agree)}"]
             if math.isfinite(share)
@@ -116,11 +116,11 @@ def _optimum(data: Dataset) -> list[str]:
     ]
 
 
-def held_back(held: list[str], ended: str) -> str:
+def held_back(held: list[str], ended: str, *, settled: bool) -> str:
     """Name what limits the objective of an optimum: limits and bounds, or the ending of its search."""
     if ended == "looks":
         held = [*held, "the number of evaluations (optimise.looks), which ended its search"]
-    return "; ".join(held) or "nothing: an optimum in the open"
+    return "; ".join(held) or ("nothing: an optimum in the open" if settled else "not known, the search did not settle")
 
 
 def _nearest(data: Dataset) -> list[str]:

@@ -56,10 +56,22 @@ def test_run_with_report_draws_the_figures_and_writes_the_page_as_stages_of_its_
 
 
 def test_an_optimum_is_in_the_open_only_if_its_search_has_settled() -> None:
-    assert held_back([], "converged") == "nothing: an optimum in the open"
-    assert held_back(["swing"], "converged") == "swing"
-    assert held_back([], "looks") == "the number of evaluations (optimise.looks), which ended its search"
-    assert held_back(["swing"], "looks") == "swing; the number of evaluations (optimise.looks), which ended its search"
+    looks = "the number of evaluations (optimise.looks), which ended its search"
+    assert held_back([], "converged", settled=True) == "nothing: an optimum in the open"
+    assert held_back(["swing"], "converged", settled=True) == "swing"
+    assert held_back([], "looks", settled=False) == looks
+    assert held_back(["swing"], "looks", settled=False) == f"swing; {looks}"
+    # A feed rack stalled where its stay above the plate ends, with four parameters at their bounds.
+    assert held_back([], "stalled", settled=False) == "not known, the search did not settle"
+
+
+def test_a_search_that_did_not_settle_is_not_told_as_an_optimum_in_the_open(tmp_path: Path) -> None:
+    inside = {"max_abs_dev": 0.01, "active": ""}
+    told = "\n".join(ending(write_dataset(tmp_path / "open", optimum=inside)).lines)
+    assert "held back by: nothing: an optimum in the open" in told
+    stalled = {**inside, "kkt_residual": 1e-3, "ended": "stalled"}
+    told = "\n".join(ending(write_dataset(tmp_path / "stalled", optimum=stalled)).lines)
+    assert "held back by: not known, the search did not settle" in told
 
 
 def test_output_that_stopped_at_a_bound_but_does_not_matter_holds_nothing_back() -> None:
