@@ -130,11 +130,6 @@ class Member:
         """Whether the crank turns as the main shaft does, so that extrema over a turn are those of the family."""
         return self.driver is None and self.ratio == 1
 
-    @property
-    def cycles(self) -> int:
-        """Turns of its crank in one turn of the main shaft, without the sense; 1 if another member drives it."""
-        return abs(self.ratio) if self.driver is None else 1
-
     def designs(self, designs: Array) -> Array:
         """Design matrix of this member's family."""
         return np.ascontiguousarray(designs[:, self.columns])

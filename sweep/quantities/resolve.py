@@ -141,9 +141,10 @@ def _of_member(machine: Machine, name: str, member: Member, own: str) -> kinds.Q
     named = point.output if point else named
     if kinds.group_of(member.family, found) is not None:
         placed = replace(found, of=found.of and f"{member.name}.{found.of}", stage=f"{member.name}.{found.stage}")
-        if isinstance(placed, kinds.LimitPosition) and placed.kind in ("phi0", "stroke_ratio") and member.cycles > 1:
-            placed = replace(placed, cycles=member.cycles)
-            named = replace(named, text=f"{named.text}, with 2 pi/{member.cycles}, a turn of its crank, for 2 pi")
+        cycles = machine.cycles(member)
+        if isinstance(placed, kinds.LimitPosition) and placed.kind in ("phi0", "stroke_ratio") and cycles > 1:
+            placed = replace(placed, cycles=cycles)
+            named = replace(named, text=f"{named.text}, with 2 pi/{cycles}, a turn of its crank, for 2 pi")
         return replace(placed, output=named)
     match found:
         case kinds.Extent() | kinds.Dimension():

@@ -49,6 +49,12 @@ class Machine(Family):
         """Return the member of a name."""
         return next(m for m in self.members if m.name == name)
 
+    def cycles(self, member: Member) -> int:
+        """Return how often the motion of a member repeats in a turn: as the first crank that drives it turns."""
+        while member.driver is not None:
+            member = self.member(member.driver[0])
+        return abs(member.ratio)
+
     def split(self, name: str) -> tuple[Member, str] | None:
         """Split a dotted name into member and own name; None for a name of the machine itself."""
         return next(((m, m.own(name)) for m in self.members if m.own(name)), None)
