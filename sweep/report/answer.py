@@ -243,7 +243,8 @@ def search_sentence(data: Dataset, scanned: Scan) -> str:
     residual, violation = tables.value_of(data.optimum, "kkt_residual"), tables.value_of(data.optimum, "violation")
     wanted = "" if residual <= KKT else f" where {number(KKT)} is wanted"
     words = "" if math.isnan(residual) and proof_sentence(data) else f"{_residual(residual)}{wanted}, "
-    return f"{text}. {words}{'l' if words else 'L'}argest violation of a limit {number(violation, 3)}."
+    words += f"largest violation of a limit {number(violation, 3)}."
+    return f"{text}. {words[0].upper()}{words[1:]}"
 
 
 def _count(n: float) -> str:

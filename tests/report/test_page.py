@@ -133,7 +133,7 @@ def test_figures_depend_on_the_data_only(full: Path, tmp_path: Path) -> None:
         ({"kkt_residual": 1e-3}, "KKT residual 0.001 where 1·10⁻⁶ is wanted"),
         ({"kkt_residual": 1.0, "ended": "time"}, "the optimiser had no time left to settle."),
         ({"kkt_residual": 1.0, "ended": "time"}, "KKT residual 1 where 1·10⁻⁶ is wanted"),
-        ({"kkt_residual": np.nan}, "its KKT residual does not exist where 1·10⁻⁶ is wanted"),
+        ({"kkt_residual": np.nan}, "Its KKT residual does not exist where 1·10⁻⁶ is wanted"),
         ({"max_abs_d2s": 9.0}, "Not achieved: the optimiser ended behind the best design of the sweep, 8.5 mm/rad²"),
         ({"stroke": 24.0, "status": 5}, "No design was found that keeps all limits"),
         ({"stroke": 24.0, "status": 5}, "Not achieved: stroke: 24 mm instead of 24.4 to 24.6 mm"),
