@@ -21,8 +21,7 @@ from sweep.engine.run import run
 from sweep.evaluation.loads import curves_of
 from sweep.families import family
 from sweep.optimise import Problem, Result, minimise
-from sweep.optimise.extrema import points
-from sweep.optimise.extrema import scanned as edges
+from sweep.optimise.extrema import scanned
 from sweep.optimise.local.start import DIFFERS
 from sweep.study import Limit, OptimiseSettings, load_study
 
@@ -216,8 +215,8 @@ def test_the_largest_stroke_of_a_member_is_that_of_its_longest_crank() -> None:
 
 def blind(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the search look at its poses alone, as if no family knew of phases and edges."""
-    monkeypatch.setattr(points, "poses_needed", lambda family, design, outputs: 0)
-    monkeypatch.setattr(points, "may_bend", lambda family, outputs: False)
+    monkeypatch.setattr(scanned, "poses_needed", lambda family, design, outputs: 0)
+    monkeypatch.setattr(scanned, "may_bend", lambda family, outputs: False)
 
 
 def test_a_search_that_missed_a_jump_has_not_converged_and_says_the_true_value(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -243,14 +242,14 @@ def test_edges_are_the_ends_of_phases_and_where_a_tool_pierces() -> None:
     design = np.array([{p.name: p.default for p in cam.parameters} | CAM], dtype=object)[0]
     matrix = np.array([design[name] for name in cam.parameter_names], np.float64)
     ends = 0.3 + np.array([0.0, 1.0, 1.7, 2.9])
-    (before, behind), which = edges.edges(cam, matrix, ["d3s"])
+    (before, behind), which = scanned.edges(cam, matrix, ["d3s"])
     assert sorted(which[which >= 1.0]) == list(range(1, 9))
     for end in ends:
         k = int(np.abs(0.5 * (before + behind) - end).argmin())
         assert before[k] < end < behind[k] and behind[k] - before[k] < 1e-10
     row = pierced(0.01)
     full = extended(family("guide"), ["tool_load"])
-    sides, _ = edges.edges(full, np.array([row[name] for name in full.parameter_names]), ["tool_load"])
+    sides, _ = scanned.edges(full, np.array([row[name] for name in full.parameter_names]), ["tool_load"])
     loads = sweep.evaluate("guide", row, ["tool_load"], phi=sides.ravel())["tool_load"].to_numpy().reshape(2, -1)
     jumps = np.abs(loads[1] - loads[0])
     # In at the fabric and off at the turning point; elsewhere a slope of some hundreds makes 1e-8.
