@@ -87,7 +87,8 @@ def _of_family(entry: Family) -> Schema:
 
 def _described(p: Parameter) -> str:
     notes = [p.sign] if p.sign else []
-    notes += [p.choice] if p.choices else [example(internal_unit(p.unit))]
+    kind = "a whole number" if p.unit == "count" else example(internal_unit(p.unit))
+    notes += [p.choice if p.choices else kind]
     notes += [f"{p.default:g} if left out"] if p.default is not None else []
     return f"{p.text} ({'; '.join(notes)})"
 
