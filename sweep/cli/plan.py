@@ -33,6 +33,7 @@ from sweep.jobs.progress import Phases
 from sweep.report.quantities import number, quantity
 from sweep.report.tables import bound_words
 from sweep.study import Study, load_study
+from sweep.study.loads import speeds
 from sweep.study.space import Axis
 
 # Poses per design for the shares of the effects, and number of designs on which their rules are tested.
@@ -93,9 +94,8 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         ),
         *((words, f"{duration(seconds)}, {_times(seconds / cost.seconds)}") for words, seconds in others),
     ]
-    lines = [f"{study.name}: {study.title}" if study.title else study.name, *_mechanism(study.family)]
-    if study.speed is not None:
-        lines += [f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)"]
+    title = f"{study.name}: {study.title}" if study.title else study.name
+    lines = [title, *_mechanism(study.family), *_speed(study)]
     of = f"{kind} of" if study.space.axes else "nothing is swept"
     lines += ["", f"{how_many(study.space.count, 'design')}, {of}"]
     lines += aligned([(axis.name, _axis(axis)) for axis in study.space.axes])
@@ -104,6 +104,19 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
         lines += ["", f"to be made large: {large}" if large else f"to be made small: {study.objective.output}"]
     lines += [*_optimiser(study), *_proof(study), *_front(study)]
     return [*lines, "", "estimated cost, without the first compilation of the kernels", *aligned(costs)]
+
+
+def _speed(study: Study) -> list[str]:
+    """Give the speed of the scene, and the speeds among a family's own parameters, which it does not set."""
+    if study.speed is None:
+        return []
+    own = {p.name for p in study.family.parameters if p.unit == "speed"} - speeds(study.family, study.speed).keys()
+    fixed = {name: value for name, value in study.space.fixed.items() if name in own and value != study.speed}
+    words = ", ".join(f"{name} = {value:g} rad/s" for name, value in fixed.items())
+    return [
+        f"speed {study.speed * 30.0 / math.pi:g} rpm ({study.speed:.6g} rad/s)",
+        *([f"  which does not set {words}"] if fixed else []),
+    ]
 
 
 def _optimiser(study: Study) -> list[str]:

@@ -12,6 +12,7 @@ from sweep.chunks.plan import feasible_designs, pilot, spread_designs
 from sweep.cli.plan import plan_lines
 from sweep.engine.estimate import estimate
 from sweep.evaluation.summaries import design_outputs
+from sweep.families import family
 from sweep.quantities.limits import meets
 from sweep.study import load_study, study_from_data
 
@@ -78,3 +79,16 @@ def test_a_rod_of_a_material_weighs_in_what_matters_as_the_same_mass_does() -> N
         found.append(number(lines_of(study_from_data(data | {"bodies": bodies}, Path("bars"))), "coupler"))
     # The coupler's mass over a third of the rocker's, which is a rod too: their lengths are 200 and 90 mm.
     assert found == [6.67, 6.67]
+
+
+@pytest.mark.parametrize(("own", "told"), [({}, True), ({"omega1": "600 rpm"}, False)])
+def test_a_speed_that_the_scene_does_not_set_is_named(own: dict[str, str], told: bool) -> None:
+    lengths = {name: f"{value} mm" for name, value in family("kim_dison").example.items() if name in "rlhab"}
+    data = {
+        "study": {"name": "turned"},
+        "mechanism": {"family": "kim_dison"},
+        "scene": {"speed": "600 rpm", "want": ["max_abs_omega3"]},
+        "design": {**lengths, **own},
+    }
+    lines = lines_of(study_from_data(data, Path("turned")))
+    assert ("  which does not set omega1 = 1 rad/s" in lines) is told
