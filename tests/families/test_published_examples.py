@@ -224,7 +224,7 @@ def test_quick_return_of_marghitu_and_dupac_has_the_printed_velocities_and_accel
 
 def test_slot_beside_its_pivot_moves_as_in_norton() -> None:
     # Design of Machinery, table P4-3 row a, open circuit: crank 2 at 30 deg, rocker 4, frame 6, slot square to the
-    # rocker; at 10 rad/s the rocker turns with -10.3 rad/s and the slip is 33.5.
+    # rocker; at 10 rad/s the rocker turns with -10.3 rad/s and the slip is 33.5.  Quoted without the book at hand.
     design = {"a": 2.0, "e": 6.0, "h": -4.0}
     found = sweep.evaluate("inverted_slider_crank", design, "psi, s, dpsi, ds", phi="30 deg").iloc[0]
     assert math.degrees(found["psi"]) % 360.0 == pytest.approx(232.7, abs=0.05)
