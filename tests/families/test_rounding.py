@@ -22,13 +22,13 @@ SUBJECTS = subjects()
 ROOTED = ("backrest_tension", "backrest_closure")
 ASKED = [*(n for n in NAMES if n not in ROOTED and not isinstance(family(n).domain, March)), *CHAINS]
 QUICK = ("rssr", "guide", "slotted", "spherical_looper", "cylindrical_looper", "rssr+guide")
-KINDS = ("ordinary", "wide", "tiny")  # tiny: a crank of 1e-2 to 1e-5 of the other links
+KINDS = ("ordinary", "wide", "tiny")  # tiny: the first length, mostly the crank, by 1e-1 to 1e-5 shorter
 DESIGNS, ANGLES, TRIALS = 24, 4, 8
 UNIT = 2.0**-53
 STEP = 1e-6  # relative, of difference quotients: good to 1e-9, and what they multiply are roundings
 # Two evaluations differ by twice the error of one, for which the oracle tables allow 16.
 ALLOWED = 32.0
-# Single poses next to a singularity of an inner loop exceed it, of the kinds above at most 1 % in any output.
+# Single poses next to a singularity of an inner loop exceed it, of the kinds above some 1 % in any output.
 SHARE = 0.03
 
 
