@@ -16,7 +16,7 @@ from sweep.evaluation.poses import query_of
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
-from sweep.evaluation.tables import Table, design_matrix, kept_columns, plain_columns
+from sweep.evaluation.tables import Table, design_matrix, index_of, kept_columns, plain_columns
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, March
@@ -117,8 +117,8 @@ def summarise(
     computed: dict[str, Any] = {name: columns[name] for name in (*with_errors(wanted, chosen), "status")}
     if status_text:
         computed["status_text"] = np.array(meanings(columns["status"]), dtype=object)
-    index = given.index if isinstance(given, pd.DataFrame) else None
     repeated = kept_columns(given, keep, computed, len(matrix))
+    index = index_of(given, len(matrix))
     result = pd.DataFrame(repeated | computed, index=index, copy=bool(repeated))  # the arrays made here are not shared
     errors = {error_of(name): unit for name, unit in units.items() if error_of(name) in computed}
     result.attrs["units"] = {**units, **errors}

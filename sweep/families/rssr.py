@@ -168,10 +168,13 @@ def limits(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     status, values = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))
     errors = np.empty_like(values) if accuracy.target is not None else None
     rssr.limits(designs, status, values, errors)
-    columns = dict(zip(rssr.LIMIT_NAMES, np.ascontiguousarray(values.T), strict=True))
-    if errors is not None:
-        columns |= zip((f"err_{name}" for name in rssr.LIMIT_NAMES), np.ascontiguousarray(errors.T), strict=True)
-    return chosen(columns, wanted, status)
+    columns: Columns = {"status": status}
+    for k, name in enumerate(rssr.LIMIT_NAMES):
+        if name in wanted:
+            columns[name] = np.ascontiguousarray(values[:, k])
+            if errors is not None:
+                columns[f"err_{name}"] = np.ascontiguousarray(errors[:, k])
+    return columns
 
 
 def true_maxima(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
