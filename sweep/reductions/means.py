@@ -27,6 +27,7 @@ from sweep.reductions.rounding import ALONE, shaken, shaken_anywhere
 from sweep.reductions.sampling import DESIGN_STATUS, blocks, pose_columns, sample_turn
 
 SAMPLES = 128  # first number of samples of a turn
+HIGHEST = 9  # number of the highest orders that samples show, the largest of which bounds the error of their mean
 NEAR = 0.3  # distance of a singularity [rad] below which panels are used
 PANEL = 1.0  # length of the first panels relative to that distance, for which the 15-point rule errs by 1e-13
 PANELS_AT_ONCE = 1024
@@ -124,8 +125,8 @@ def _alone(family: Family, designs: Array, rows: Indices, pose: str, top: Array,
 def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, Status, Array]:
     """Means over equidistant samples, their errors, status, and place of the largest value [rad], each (n,).
 
-    The error is estimated from the mean of every other sample.  For a periodic curve without near singularities it is
-    squared when samples are doubled.
+    The error is the sum of those orders of the squares that are multiples of SAMPLES.  The highest orders that samples
+    show are larger.  One of them alone, by which the mean of every other sample differs, may vanish by chance.
     """
     n = len(designs)
     mean, err, top, status = np.full(n, np.nan), np.full(n, np.nan), np.empty(n), np.empty(n, np.uint8)
@@ -137,8 +138,9 @@ def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, S
         size = np.abs(values).max(axis=1)
         size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
         squares = np.square(values / size[:, None])
-        whole, before = (np.sqrt(some.sum(axis=1) / some.shape[1]) for some in (squares, squares[:, ::2]))
-        mean[part], err[part] = size * whole, size * (np.abs(whole - before) + _rounded(_blur(squares), whole))
+        whole = np.sqrt(squares.sum(axis=1) / SAMPLES)
+        last = 2.0 * np.abs(np.fft.rfft(squares, norm="forward"))[:, -HIGHEST:].max(axis=1)
+        mean[part], err[part] = size * whole, size * _rounded(TWO_PI * last + _blur(squares), whole)
     return mean, err, status, top
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import sweep
 from kernels import status as st
 from sweep.families import family
-from sweep.families.base import Angles
+from sweep.families.base import Accuracy, Angles
+from sweep.reductions.means import mean_squares
 from tests.support.near_change_points import RSSR, crowded_angles, near_change_points
 
 # At a margin of 2e-9 two coarse grids agree on 0.3043, neither of which sees the peak.
@@ -70,3 +73,25 @@ def test_a_mean_of_a_curve_that_switches_stands_where_another_member_of_a_machin
     assert turning["status"] == st.OK and lost["status"] == st.NOT_ROTATABLE
     assert lost["thread.rms_d2s"] == pytest.approx(turning["thread.rms_d2s"], rel=1e-8)  # as accurate as asked for
     assert np.isnan(lost["needle.rms_d2s"]) and np.isnan(lost["needle.max_d2s"])
+
+
+def peaks(designs, angles, wanted):
+    """Square roots of peaks at the crank angle and with the width that the first two inputs give."""
+    place, width = designs[:, :1], designs[:, 1:2]
+    values = np.sqrt(np.sinh(width) / (np.cosh(width) - np.cos(angles.phi - place)))
+    return dict.fromkeys(wanted, values) | {"status": np.zeros(values.shape, np.uint8)}
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
+def test_a_mean_of_samples_knows_its_error_wherever_a_peak_falls(accuracy: float) -> None:
+    """Nothing names these peaks: every other sample alone gives the same mean for one peak in fifty by chance."""
+    draw, n = np.random.default_rng(8), 2000
+    designs = np.tile(np.ones(8), (n, 1))
+    designs[:, 0], designs[:, 1] = draw.uniform(0.0, 2.0 * np.pi, n), np.exp(draw.uniform(np.log(0.02), 0.0, n))
+    peaked = replace(RSSR, poses=peaks, precise_poses=None, steps=(), capabilities=())
+    found = mean_squares(peaked, designs, ["rms_dpsi"], Accuracy(target=accuracy))
+    assert (found["status"] == st.OK).all()
+    # The mean of the squares is 1; the slack is rounding of 128 samples.
+    assert (np.abs(found["rms_dpsi"] - 1.0) <= found["err_rms_dpsi"] + 1e-14).all()
+    # The target refers to the largest estimate of the integral: a first panel may take a peak for a wider one.
+    assert (found["err_rms_dpsi"] <= 4.0 * accuracy).all()
