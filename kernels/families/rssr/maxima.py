@@ -68,7 +68,6 @@ from kernels.families.rssr.sampling import (
     sample,
     sample_block,
     sample_block_both,
-    sample_both,
     settle,
 )
 from kernels.jit import inline, kernel
@@ -214,29 +213,6 @@ def _list_maxima(
 
 
 @inline
-def _list_both(block: int, at: Array, table: CosSin, of_p: Search, of_q: Search) -> None:
-    """As :func:`_list_maxima`, of the first and the second order, which share their samples."""
-    count_p, count_q = _ZERO, _ZERO
-    (grid_p, size_p, m_p, first_p), (grid_q, size_q, m_q, first_q) = of_p, of_q
-    for i in range(block):
-        first_p[i], first_q[i] = count_p, count_q
-        if at[i + ACROSS] * MOST < PER_RHO:
-            continue
-        n = FEWEST
-        while n * at[i + ACROSS] < PER_RHO:
-            n *= 2
-        if n == FEWEST:
-            at_fewest = Samples(i, BLOCK, n, 0)
-            count_p = list_marked(int(grid_p[MARKS + i]), at, i, table, grid_p, at_fewest, m_p, count_p)
-            count_q = list_marked(int(grid_q[MARKS + i]), at, i, table, grid_q, at_fewest, m_q, count_q)
-        else:
-            sample_both(at, i, table, n, size_p, size_q)
-            count_p = list_peaks(at, i, table, n, size_p, m_p, count_p)
-            count_q = list_peaks(at, i, table, n, size_q, m_q, count_q)
-    first_p[block], first_q[block] = count_p, count_q
-
-
-@inline
 def _maxima_of(
     start: int, block: int, at: Array, who: Counts, of: Search, target: float, status: Status, places: Places,
     heights: Heights,
@@ -297,7 +273,8 @@ def true_maxima(
     together shares reduction and samples, and has the bits that it has by itself.  The search is statistical, not
     proven; docs/rssr.md gives the number of random designs it was measured on.
     """
-    at, who, of, of_q = new_block(), np.empty(BLOCK, np.int64), _new_search(), _new_search()
+    at, who, of = new_block(), np.empty(BLOCK, np.int64), _new_search()
+    of_q = Search(np.empty(GRID_SIZE), of.size, of.m, of.first)  # the first order is listed when the second is done
     places, asked = Places(phi, error, phi_error), Heights(max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
@@ -313,8 +290,9 @@ def true_maxima(
             sample_block_both(padded, at, table, of.grid, of_q.grid)
             mark_peaks(padded, of.grid)
             mark_peaks(padded, of_q.grid)
-            _list_both(block, at, table, of, of_q)
+            _list_maxima(block, at, table, of_q, PER_RHO, None, max_abs_d2psi)
             _maxima_of(start, block, at, who, of_q, target, status, places, Heights(None, max_abs_d2psi, None))
+            _list_maxima(block, at, table, of, PER_RHO, max_abs_dpsi, None)
             _maxima_of(start, block, at, who, of, target, status, places, Heights(max_abs_dpsi, None, None))
         elif max_abs_dpsi is not None or max_abs_d2psi is not None:
             sample_block(padded, at, table, of.grid, max_abs_dpsi, max_abs_d2psi)

@@ -200,17 +200,6 @@ def sample(at: Array, k: int, table: CosSin, n: int, size: Array, first: Array |
 
 
 @inline
-def sample_both(at: Array, k: int, table: CosSin, n: int, of_p: Array, of_q: Array) -> None:
-    """As :func:`sample`, of the first and the second order at once, which costs little more than the second alone."""
-    e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
-    (cos, sin), begin = table, (n - FEWEST) & _NEVER_NEGATIVE
-    for i in range(n):
-        p, q, _, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
-        of_p[1 + i], of_q[1 + i] = abs(p), abs(q)
-    of_p[0], of_p[n + 1], of_q[0], of_q[n + 1] = of_p[n], of_p[1], of_q[n], of_q[1]
-
-
-@inline
 def _row(size: Array, i: int) -> Array:
     """Row i of the samples of a block.
 
@@ -232,7 +221,7 @@ def sample_block(count: int, at: Array, table: CosSin, size: Array, first: Array
 
 @inline
 def sample_block_both(count: int, at: Array, table: CosSin, of_p: Array, of_q: Array) -> None:
-    """As :func:`sample_block`, of the first and the second order at once."""
+    """As :func:`sample_block`, of the first and the second order at once: little more costly than the second alone."""
     for i in range(FEWEST):
         u, v, here, there = table[0][i], table[1][i], _row(of_p, 1 + i), _row(of_q, 1 + i)
         for k in range(count):
