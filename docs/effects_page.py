@@ -52,6 +52,14 @@ def needed(group: Iterable[Effect]) -> list[str]:
     return list(dict.fromkeys(n.removeprefix(f"{e.families[0]}_") for e in group for n in e.needs))
 
 
+def stages(group: Sequence[Effect]) -> str:
+    """Say in which stages of a chain the effects of a group serve, by name where they differ."""
+    first = [entry.name for entry in group if entry.even_crank]
+    if len(first) in (0, len(group)):
+        return "first" if first else "any"
+    return f"any ({', '.join(f'`{name}`' for name in first)}: first)"
+
+
 def link_lists(group: Sequence[Effect]) -> dict[tuple[TreePlace, ...], list[Effect]]:
     """Return the links and joints of the effects of a group, with the effects that share them."""
     alike: dict[tuple[TreePlace, ...], list[Effect]] = {}
@@ -222,6 +230,7 @@ def page() -> str:
             subject=lambda group: "; ".join(dict.fromkeys(entry.title.split(": ")[0] for entry in group)),
             families=lambda group: dict.fromkeys(name for entry in group for name in entry.families),
             needed=needed,
+            stages=stages,
             link_lists=link_lists,
             listed=(LOADS, CONTACT),
             tables=lambda group: groupby(parts(group), key=lambda part: part[0]),
