@@ -102,7 +102,8 @@ def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
     columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
     travel = columns.pop("travel")
     with np.errstate(all="ignore"):
-        columns["stitch_error"] = np.where(travel != 0.0, columns["lost_travel"] / travel, np.nan)
+        error = columns["lost_travel"] / travel + 0.0  # nothing lost of a travel backwards is 0, not -0
+        columns["stitch_error"] = np.where(travel != 0.0, error, np.nan)
     return columns | {"changes": changes, "status": status}, heights, forces
 
 

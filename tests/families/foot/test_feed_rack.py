@@ -31,6 +31,7 @@ def test_foot_on_the_rack_of_a_feed_mechanism_loses_contact_where_the_force_vani
     assert got.status.tolist() == [st.NO_EVENT, st.NO_EVENT, st.OK, st.OK]
     assert (got.flights[:2] == 0.0).all() and (got.flights[2:] > 0.0).all()
     assert got.stitch_error[:2].tolist() == [0.0, 0.0] and 0.0 < got.stitch_error[2] < got.stitch_error[3]
+    assert not np.signbit(got.stitch_error).any()  # a rack that runs backwards loses 0, not -0
     assert force[above].min() > 0.0
     at = sweep.evaluate("feed", p | {"phi": got.phi_loss[2]}, ["y_t", "d2y_t"]).iloc[0]
     left = p["F0"] + p["k"] * (at.y_t - plate) + p["m"] * table["omega"][2] ** 2 * at.d2y_t
