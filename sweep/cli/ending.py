@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,12 +27,15 @@ from sweep.quantities.limits import compared
 from sweep.report.answer import proof_sentence, search_words, share_words, shortest_link, survey_warnings, unsettled
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.front import Front
-from sweep.report.tables import bound_words, limit_states, limited
+from sweep.report.tables import bound_words, limit_states, limited, parameter_rows
 from sweep.study import Limit
 from sweep.synthesis.fit import fit_line
 
 TURN = np.arange(360, dtype=np.float64) * (2.0 * math.pi / 360)
 LOOKED_AT = 1024  # designs of a space among which the nearest miss is sought without an optimiser
+WIDER = "for others sweep wider, or give them in [limits]"
+KEPT = 1e-9  # share of its bound by which a kept limit may be missed
+NONE_KEPT = "no design keeps all limits; nearest is the one whose largest miss, as a share of its limit, is least"
 
 
 @dataclass(frozen=True)
@@ -101,12 +104,17 @@ def _optimum(data: Dataset) -> list[str]:
     active = [s for s in limit_states(data) if s.state == "active"]
     held = [f"{s.shown.words} ({s.bound})" for s in active]
     words = [w.strip() for w in str(data.optimum.get("active") or "").split(";")]
-    held += [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
+    edges = [w for w in words if w.endswith(" bound") and w.split()[0] not in {s.shown.name for s in active}]
+    held += edges
+    made = {*data.study.made, *data.study.rescaled}
+    follow = [name for name in dict.fromkeys(w.split()[0] for w in edges) if name in made]
+    ends = ", ".join(f"{name} = {limited(data, name).show(float(data.optimum[name]))}" for name in follow)
     share = float(data.optimum.get("yield", math.nan))
     ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
     return [
         f"optimum: {objective.words} {objective.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {held_back(held, ended, settled=not unsettled(data.optimum))}",
+        *([f"bounds that follow from the designs of the sweep: {ends}; {WIDER}"] if ends else []),
         *(
             [f"as it is made: {share_words(share, data.study.wanted_yield, ended, agree)}"]
             if math.isfinite(share)
@@ -130,7 +138,7 @@ def _nearest(data: Dataset) -> list[str]:
     # Only if the optimality conditions of the smallest relaxation hold is the missing amount the smallest one.
     open_end = [] if residual <= KKT else ["the search did not settle there: less may have to give way than it says"]
     apart = _cannot_meet(data)
-    return ["no design keeps all limits", *_give_way(data, data.optimum, "the nearest design found"), *apart, *open_end]
+    return [NONE_KEPT, *_give_way(data, data.optimum, "the nearest design found"), *apart, *open_end]
 
 
 def _cannot_meet(data: Dataset) -> list[str]:
@@ -175,32 +183,36 @@ def _nearest_of_space(data: Dataset) -> list[str]:
     outputs = [limit.output for limit in study.limits if limit.output not in names]
     columns: dict[str, Any] = design_outputs(study.family, designs, outputs, study.accuracy, study.window)
     columns |= {name: designs[:, k] for k, name in enumerate(names)}
-    worst = np.max([_shortfall(limit, columns[limit.output])[1] for limit in study.limits], axis=0)
-    row = {name: values[int(np.argmin(worst))] for name, values in columns.items()}
-    return [
-        "no design keeps all limits",
-        *_give_way(data, row, f"the nearest of {how_many(len(designs), 'design')} of the space"),
-    ]
+    shares = [_shortfall(limit, columns[limit.output])[1] for limit in study.limits]
+    row = {name: values[int(np.argmin(np.max(shares, axis=0)))] for name, values in columns.items()}
+    keep = [int((share <= KEPT).sum()) for share in shares]
+    alone = [f"kept by {count or 'none'} of these designs" for count in keep]
+    return [NONE_KEPT, *_give_way(data, row, f"the nearest of {how_many(len(designs), 'design')} of the space", alone)]
 
 
-def _give_way(data: Dataset, row: Mapping[str, Any], who: str) -> list[str]:
+def _give_way(data: Dataset, row: Mapping[str, Any], who: str, alone: Sequence[str] = ()) -> list[str]:
+    """Name a design and the limits that it misses; ``alone`` says of each limit which designs keep it."""
     lines = []
-    for limit in data.study.limits:
+    for k, limit in enumerate(data.study.limits):
         shown = limited(data, limit.output)
         if limit.output not in row:
             continue
         short, share = (float(x[0]) for x in _shortfall(limit, np.array([row[limit.output]], np.float64)))
-        if share <= 1e-9:
+        if share <= KEPT:
             continue
         bound = bound_words(limit, shown)
-        if math.isnan(short) or shown.words.startswith("rotatable"):
-            lines.append(
-                f"  {shown.words} ({bound}): it has none" if math.isnan(short) else f"  {shown.words}: {bound}"
-            )
+        if math.isnan(short):
+            words = f"{shown.words} ({bound}): it has none"
+        elif shown.words.startswith("rotatable"):
+            words = f"{shown.words}: {bound}"
         else:
             value = shown.show(float(compared(limit.output, float(row[limit.output]))))
-            lines.append(f"  {shown.words} must give way by {shown.show(short, 3)}: {value} instead of {bound}")
-    return [f"{who} misses", *lines] if lines else []
+            words = f"{shown.words} must give way by {shown.show(short, 3)}: {value} instead of {bound}"
+        lines.append(f"  {words}{f' ({alone[k]})' if alone else ''}")
+    together = f"{len(lines)} limits, which must give way together" if len(lines) > 1 else "1 limit"
+    swept = {p.name: p.value for p in parameter_rows(data, row) if p.name in data.study.space.bounds}
+    design = ", ".join(f"{name} = {value}" for name, value in swept.items())
+    return [f"{who}, {design}, misses {together}:" if design else f"{who} misses {together}:", *lines] if lines else []
 
 
 def _shortfall(limit: Limit, values: Any) -> tuple[Any, Any]:

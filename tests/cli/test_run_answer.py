@@ -20,7 +20,7 @@ from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.tables import limit_state
 from tests.optimise.test_study import STUDY
-from tests.support.report_dataset import write_dataset
+from tests.support.report_dataset import study_data, write_dataset
 
 
 def run(folder: Path, text: str) -> tuple[int, str]:
@@ -125,6 +125,48 @@ def test_sweep_without_optimiser_and_without_survivors_names_the_nearest_miss(tm
     code, said = run(tmp_path, text)
     assert code == 4
     assert "the nearest of" in said and "swing must give way by" in said and "instead of at least 150°" in said
+    assert " misses 2 limits, which must give way together:" in said and "(kept by none of these designs)" in said
+
+
+CRANKS = """
+[study]
+name = "cranks"
+[mechanism]
+family = "slider_crank"
+[scene]
+want = ["stroke", "max_abs_d2s"]
+[design]
+a = { values = [8, 9, 10, 11], unit = "mm" }
+b = "40 mm"
+[limits]
+stroke = { min = 20.5, max = 30, unit = "mm" }
+max_abs_d2s = { max = 11, unit = "mm/rad^2" }
+"""
+
+
+def test_limits_that_contradict_each_other_are_each_kept_by_some_designs(tmp_path: Path) -> None:
+    """Strokes are 2 a, accelerations a (1 + a/b); the crank of 9 mm misses a twelfth of 30 mm, the others more."""
+    code, said = run(tmp_path, CRANKS)
+    assert code == 4
+    lines = said.splitlines()
+    k = next(k for k, line in enumerate(lines) if line.startswith("the nearest"))
+    assert lines[k] == "the nearest of 4 designs of the space, a = 9 mm, misses 2 limits, which must give way together:"
+    assert lines[k + 1 : k + 3] == [
+        "  stroke must give way by 2.5 mm: 18 mm instead of 20.5 to 30 mm (kept by 1 of these designs)",
+        "  largest acceleration must give way by 0.025 mm/rad²: 11.025 mm/rad² instead of at most 11 mm/rad² "
+        "(kept by 1 of these designs)",
+    ]
+
+
+def test_bounds_that_follow_from_the_designs_of_the_sweep_are_told_with_their_values(tmp_path: Path) -> None:
+    fitted = study_data(fit={"stroke": "24.5 mm"})
+    for name in ("xi2", "eta2", "h2"):
+        del fitted["design"][name]
+    optimum = {"c2": 91.5, "active": "a1 at its lower bound; c2 at its upper bound"}
+    told = "\n".join(ending(write_dataset(tmp_path / "given", optimum=optimum)).lines)
+    assert "c2 at its upper bound" in told and "follow from" not in told
+    told = "\n".join(ending(write_dataset(tmp_path / "fitted", fitted, optimum=optimum)).lines)
+    assert "bounds that follow from the designs of the sweep: c2 = 91.5 mm; for others sweep wider" in told
 
 
 def test_brake_is_told_everywhere_and_the_next_run_searches_again(tmp_path: Path) -> None:
