@@ -22,6 +22,7 @@ from sweep.effects import called_for
 from sweep.evaluation.routes import GOES_ON
 from sweep.evaluation.summaries import Route, design_outputs, routes
 from sweep.families.base import Array, Columns, Work
+from sweep.families.curve_features import Crossing
 from sweep.families.names import error_of, parts
 from sweep.quantities.limits import Limit, meets
 from sweep.study import Study
@@ -273,7 +274,7 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
     Where only feasible designs are kept, effects and other long routes follow all limits, unless they have limits
     themselves.
     """
-    selected = routes(study.family, study.want, study.accuracy, study.window is not None)
+    selected = routes(study.family, study.want, study.accuracy, study.window is not None, _jumping(study))
     limited = {limit.output for limit in study.tested_limits}
 
     def place(route: Route) -> tuple[bool, bool]:
@@ -281,6 +282,13 @@ def ordered_routes(study: Study) -> tuple[Route, ...]:
         return not _before_fit(study, route), waits
 
     return tuple(sorted(selected, key=place))
+
+
+def _jumping(study: Study) -> frozenset[str]:
+    """Pose outputs that jump where a tool pierces, in a study that gives it a force."""
+    fixed, bounds = study.space.fixed, study.space.bounds
+    largest = np.array([[fixed.get(name, bounds.get(name, (0.0, 0.0))[1]) for name in study.family.parameter_names]])
+    return frozenset().union(*(known.of for known in study.family.every(Crossing) if known.matters(largest).any()))
 
 
 def _before_fit(study: Study, route: Route) -> bool:

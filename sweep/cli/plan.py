@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
+import numpy as np
 
 from sweep.chunks.cascade import ordered_routes
 from sweep.chunks.plan import PARAMETER_UNITS, Pilot, feasible_designs, pilot, spread_designs, spread_rows
@@ -26,9 +27,10 @@ from sweep.engine.estimate import (
 )
 from sweep.errors import how_many
 from sweep.evaluation.summaries import output
-from sweep.families.base import Family
+from sweep.families.base import Angles, Array, Family
+from sweep.families.curve_features import Crossing
 from sweep.families.machines.machine import Machine
-from sweep.families.names import without_minus
+from sweep.families.names import parts, without_minus
 from sweep.jobs.progress import Phases
 from sweep.report.quantities import number, quantity
 from sweep.report.tables import bound_words
@@ -39,6 +41,7 @@ from sweep.study.space import Axis
 # Poses per design for the shares of the effects, and number of designs on which their rules are tested.
 POSES = 100.0
 ADVISED = 64
+TURN = np.arange(720.0) * (2.0 * math.pi / 720)  # crank angles at which a tool is compared with the fabric
 NAMED = 24  # largest number of uncomputed outputs that are listed
 SECONDS_PER_BOX = 20e-6  # of a proof, docs/proof.md
 
@@ -265,9 +268,29 @@ def _effects(study: Study, sample: Pilot) -> list[str]:
         lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
     if points := _points(study):
         lines += ["", "masses in the joints of their bodies, as centre and inertia are 0", f"  {', '.join(points)}"]
+    lines += _piercing(study, designs)
     rules = findings(bare, study.family, designs, study.want)
     advice = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in rules)]
     return lines + (advice if rules else [])
+
+
+def _piercing(study: Study, designs: Array) -> list[str]:
+    """Name the tools that do not enter the fabric along their way, since they are above or inside it all the time."""
+    names, angles, lines = study.family.parameter_names, Angles.of(np.asarray(TURN[None], np.float64)), list[str]()
+    for known in study.family.every(Crossing):
+        member, dot, position = known.passing.rpartition(".")
+        at, sense = (f"{member}{dot}pierce_{word}{parts(position).stage}" for word in ("at", "sense"))
+        pierced = designs[known.matters(designs)]
+        way = np.asarray(study.family.poses(pierced, angles, frozenset([known.passing]))[known.passing], np.float64)
+        level, turns = known.level(pierced), np.isfinite(way).all(axis=1)
+        inside = pierced[:, names.index(sense), None] * (way - level[:, None]) > 0.0
+        for which, effect in ((~inside.any(axis=1), "does not act"), (inside.all(axis=1), "acts on the whole way in")):
+            if (some := which & turns).any():
+                places = " to ".join(dict.fromkeys(f"{x:.4g}" for x in (level[some].min(), level[some].max())))
+                ends = f"{way[some].min():.4g} to {way[some].max():.4g} mm"
+                count = f"{some.sum()} of {how_many(len(designs), 'design')}"
+                lines.append(f"  {at} = {places} mm is outside {known.passing} = {ends} of {count}: the force {effect}")
+    return ["", "fabric that the tool does not enter on its way", *lines] if lines else []
 
 
 def _points(study: Study) -> list[str]:

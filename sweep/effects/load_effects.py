@@ -165,7 +165,7 @@ def _share_of_inertia(scene: Scene, name: str, size: Callable[[Array], Array], q
 
 
 def _advise_closed(scene: Scene) -> Advice | None:
-    words = f"share of the largest force at C that is not due to {kinetostatics.load_name(scene)}"
+    words = "share of the largest force at C that is not due to loads"
     return _share_of_inertia(scene, "force_c", partial(np.max, axis=1), words)
 
 

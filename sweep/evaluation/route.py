@@ -25,7 +25,7 @@ from sweep.reductions.events import event_outputs
 from sweep.reductions.means import mean_squares
 from sweep.reductions.rounding import shaken, sharpen_maxima
 from sweep.reductions.sampling import pose_columns
-from sweep.reductions.steps import group_ns, group_order, step_ns, steps_of
+from sweep.reductions.steps import NO_JUMPS, group_ns, group_order, step_ns, steps_of
 from sweep.reductions.turn import limits_and_reductions, margin_group
 
 Window: TypeAlias = tuple[float, float] | None
@@ -67,12 +67,14 @@ def check_window(window: tuple[float, float] | None) -> None:
         raise InputError("window", window, "two fractions of the stroke, 0 <= from < to <= 1", "design outputs")
 
 
-def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accuracy) -> Route:
+def own_route(
+    step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accuracy, jumps: frozenset[str] = NO_JUMPS
+) -> Route:
     """Make the route of a family's own step, or of a step of a chain's first stage."""
     position = [other.name for other in steps_of(stage.family)].index(step.name)
     run, cost = (
         partial(_run_step, step, stage, _step_outputs(step, stage, outputs)),
-        step_ns(stage.family, step, accuracy),
+        step_ns(stage.family, step, accuracy, jumps),
     )
     route = Route(step.name, outputs, cost, run, order=(step.work, position))
     if not stage.tail:
@@ -81,11 +83,12 @@ def own_route(step: Step, stage: Stage, outputs: tuple[str, ...], accuracy: Accu
 
 
 def general_route(
-    family: Family, general: GeneralRoute, effect: str, outputs: tuple[str, ...], accuracy: Accuracy, windowed: bool
-) -> Route:
+    family: Family, general: GeneralRoute, effect: str, outputs: tuple[str, ...], accuracy: Accuracy, windowed: bool,
+    jumps: frozenset[str],
+) -> Route:  # fmt: skip
     """Make the route of a general reduction over poses."""
     run = partial(_run_general, family, general, outputs)
-    cost = group_ns(family, general, outputs, accuracy, windowed)
+    cost = group_ns(family, general, outputs, accuracy, windowed, jumps)
     order = group_order(family, general, outputs)
     return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
 

@@ -32,7 +32,7 @@ from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
 from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
 from sweep.reductions.sampling import on_closed_turn
-from sweep.reductions.steps import applying_step, beyond_motion, group_ns
+from sweep.reductions.steps import NO_JUMPS, applying_step, beyond_motion, group_ns
 from sweep.reductions.turn import margin_group
 
 # Statuses with which some outputs are missing or rough, but others are still useful.
@@ -131,36 +131,41 @@ def with_errors(wanted: Sequence[str], accuracy: Accuracy) -> list[str]:
     return [*wanted, *map(error_of, wanted)] if accuracy.target is not None else list(wanted)
 
 
-def routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False) -> tuple[Route, ...]:
+def routes(
+    family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool = False, jumps: frozenset[str] = NO_JUMPS
+) -> tuple[Route, ...]:
     """Choose the routes to the wanted outputs, in order; each can be run by `design_outputs` alone.
 
-    With ``windowed`` the estimated times are those with a window.
+    With ``windowed`` the estimated times are those with a window, with ``jumps`` those of designs in which these pose
+    outputs jump.
 
     Raises
     ------
     InputError
         for an unknown name, or an accuracy that the family's domain or the output does not support.
     """
-    cached, key, prices = _known(family), (tuple(wanted), accuracy, windowed), costs.table()
+    cached, key, prices = _known(family), (tuple(wanted), accuracy, windowed, jumps), costs.table()
     if key not in cached or cached[key][0] is not prices:
-        cached[key] = prices, _routes(family, wanted, accuracy, windowed)
+        cached[key] = prices, _routes(family, wanted, accuracy, windowed, jumps)
     return cached[key][1]
 
 
 @of_family
-def _known(family: Family) -> dict[tuple[tuple[str, ...], Accuracy, bool], tuple[Any, tuple[Route, ...]]]:
+def _known(family: Family) -> dict[tuple[Any, ...], tuple[Any, tuple[Route, ...]]]:
     """Cache of routes with the table of costs they were estimated by: every chunk of a sweep asks for the same."""
     return {}
 
 
-def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool) -> tuple[Route, ...]:
+def _routes(
+    family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed: bool, jumps: frozenset[str]
+) -> tuple[Route, ...]:
     if isinstance(family.domain, March) and accuracy.target is not None:
         allowed = "samples=: a pose depends on those before it, so values exist on the grid that is marched only"
         raise InputError("accuracy", accuracy.target, allowed, f"design outputs of {family.name}")
     quantities = {name: resolve(family, name) for name in dict.fromkeys(wanted)}
     selected: list[Route] = []
     if isinstance(family, Machine):
-        selected, quantities = _of_members(family, quantities, accuracy, windowed)
+        selected, quantities = _of_members(family, quantities, accuracy, windowed, jumps)
     own_steps = {name: applying_step(family, name, accuracy) for name in quantities}
     # The margin of a whole chain needs all stages: the first stage alone would reject designs before the others.
     chain_margin = any(own_steps[n] is None and isinstance(q, Margin) and not q.stage for n, q in quantities.items())
@@ -169,7 +174,7 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
     for name, quantity in quantities.items():
         step, group = own_steps[name], group_of(family, quantity)
         if isinstance(quantity, Negative | Extent | TimingOf):
-            selected.append(_composed(family, quantity, accuracy, windowed))
+            selected.append(_composed(family, quantity, accuracy, windowed, jumps))
         elif step is not None and not (chain_margin and group == "margin"):
             steps.setdefault((step[0].name, step[1].number), (*step, []))[2].append(name)
         elif group is not None:
@@ -178,8 +183,8 @@ def _routes(family: Family, wanted: Sequence[str], accuracy: Accuracy, windowed:
             groups.setdefault((group, effect), []).append(name)
         else:
             raise _unserved(family, name, accuracy)
-    selected += [own_route(step, stage, tuple(names), accuracy) for step, stage, names in steps.values()]
-    selected += [general_route(family, *key, tuple(names), accuracy, windowed) for key, names in groups.items()]
+    selected += [own_route(step, stage, tuple(names), accuracy, jumps) for step, stage, names in steps.values()]
+    selected += [general_route(family, *key, tuple(names), accuracy, windowed, jumps) for key, names in groups.items()]
     stuck = {name for name, quantity in quantities.items() if _of_stuck(quantity)}
     selected = [replace(chosen, stuck=chosen.stuck or stuck.issuperset(chosen.outputs)) for chosen in selected]
     return tuple(sorted(selected, key=lambda chosen: (*chosen.order, chosen.name)))
@@ -200,7 +205,9 @@ def _unserved(family: Family, name: str, accuracy: Accuracy) -> InputError:
     return InputError("output", name, allowed, f"design outputs of {family.name}")
 
 
-def _composed(family: Family, quantity: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool) -> Route:
+def _composed(
+    family: Family, quantity: Negative | Extent | TimingOf, accuracy: Accuracy, windowed: bool, jumps: frozenset[str]
+) -> Route:
     """Make the route of a composed output; its time is that of the outputs it is composed of."""
     name, lowest = quantity.output.name, (Work.SEARCH, 0)
     operands: Sequence[str]
@@ -219,7 +226,7 @@ def _composed(family: Family, quantity: Negative | Extent | TimingOf, accuracy: 
                 title, compose = f"value {name}", partial(route.value_at, family, timing)
             else:
                 title, compose = f"timing {name}", partial(route.difference, timing)
-    components = routes(family, operands, accuracy, windowed)
+    components = routes(family, operands, accuracy, windowed, jumps)
     cost = sum(component.ns_per_design for component in components)
     # Not before the outputs it is composed of: the margin of non-rotatable designs would be left out.
     order = max([lowest, *(component.order for component in components)])
@@ -237,7 +244,7 @@ def _run_composed(
 
 
 def _of_members(
-    machine: Machine, quantities: dict[str, Quantity], accuracy: Accuracy, windowed: bool
+    machine: Machine, quantities: dict[str, Quantity], accuracy: Accuracy, windowed: bool, jumps: frozenset[str]
 ) -> tuple[list[Route], dict[str, Quantity]]:
     """Make the routes of single members and of the machine's margins; also return the remaining quantities.
 
@@ -258,7 +265,7 @@ def _of_members(
             remaining[name] = quantity
     selected: list[Route] = []
     for m in machine.members:
-        for inner in routes(m.family, outputs_of[m.name], accuracy, windowed):
+        for inner in routes(m.family, outputs_of[m.name], accuracy, windowed, frozenset(map(m.own, jumps))):
             names = tuple(f"{m.name}.{name}" for name in inner.outputs)
             run = partial(_of_member, m, inner)
             title, cost = f"{m.name}: {inner.name}", inner.ns_per_design

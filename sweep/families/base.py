@@ -150,7 +150,8 @@ class Step:
     ``applies`` tells the accuracies it serves (a dense kernel does not serve ``accuracy=``).  ``certifies``: its maxima
     are proven, and serve ``Accuracy.certify`` only.  Steps of the same kind of work are run in the order in which the
     family lists them.  ``cost`` estimates its time [ns per design]; by default it is the row "family: step" of
-    sweep/costs.toml.  ``analytic``: it takes complex designs, for exact gradients by the complex step.
+    sweep/costs.toml; ``jump_ns`` is what designs take longer whose loads jump.  ``analytic``: it takes complex designs,
+    for exact gradients by the complex step.
     """
 
     name: str
@@ -160,6 +161,7 @@ class Step:
     work: Work = Work.QUICK
     certifies: bool = False
     cost: Callable[[Accuracy], float] | None = None
+    jump_ns: float = 0.0
     analytic: bool = False
 
 

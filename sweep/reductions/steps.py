@@ -127,10 +127,14 @@ def applying_step(family: Family, name: str, accuracy: Accuracy) -> tuple[Step, 
     return next(able, None)
 
 
-def step_ns(family: Family, step: Step, accuracy: Accuracy) -> float:
-    """Estimate the time of a family's own step [ns per design]."""
+NO_JUMPS: frozenset[str] = frozenset()
+
+
+def step_ns(family: Family, step: Step, accuracy: Accuracy, jumps: frozenset[str] = NO_JUMPS) -> float:
+    """Estimate the time of a family's own step [ns per design]; ``jumps`` as for `group_ns`."""
     if step.cost is not None:
-        return step.cost(accuracy)
+        jumping = any(name in jumps for name, (effect, _) in family.dear.items() if effect == step.name)
+        return step.cost(accuracy) + (step.jump_ns if jumping else 0.0)
     row = f"{family.name}: {step.name}"
     return nanoseconds("steps", row) + nanoseconds("samples", row) * (accuracy.samples or 0)
 
@@ -246,9 +250,13 @@ def _beyond(family: Family) -> dict[str, Beyond]:
 
 
 def group_ns(
-    family: Family, group: GeneralRoute, names: Sequence[str], accuracy: Accuracy, windowed: bool = False
-) -> float:
-    """Estimate the time of a general route [ns per design] from measured times of poses and of searches."""
+    family: Family, group: GeneralRoute, names: Sequence[str], accuracy: Accuracy, windowed: bool = False,
+    jumps: frozenset[str] = NO_JUMPS,
+) -> float:  # fmt: skip
+    """Estimate the time of a general route [ns per design] from measured times of poses and of searches.
+
+    ``jumps`` are pose outputs that jump in these designs, which are searched on panels like those with kinks.
+    """
     stages, pose = _stages(family), pose_ns(family)
     if group == "margin":
         return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
@@ -268,7 +276,7 @@ def group_ns(
     # The ends of a window are found as events are.
     cuts = sum(r.windowed for r in requested) + sum(isinstance(one, WindowAngle) for one in asked)
     fused += (POSES_EVENT * pose + nanoseconds("work", "event")) * cuts
-    kinked = [request for request in requested - quick if has_kinks(family, request)]
+    kinked = [request for request in requested - quick if has_kinks(family, request, request.pose in jumps)]
     fused += len(kinked) * (PANELS_NS + POSES_PANELS * (pose + effects))
     smooth = len(requested - quick) - len(kinked)
     if not smooth:
