@@ -26,6 +26,7 @@ from sweep.families.capabilities import JointRecords
 from sweep.families.machines.machine import Machine
 
 METRES = {"mm": 1e-3, "m": 1.0}
+LEAST = "2e-15"  # kg, kg m^2: MuJoCo refuses 1e-15 or less, as bars of a mechanism below some 10 mm have
 THICK = 0.008  # thickness of a bar, relative to the extent of all joints
 DRIVING = 1.0  # the finger is at the crank's end of the coupler
 
@@ -70,7 +71,7 @@ def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, fl
         for a stage without crank, coupler and rocker or slider, or a mass without inertia.
     """
     root = Xml.Element("mujoco", model=family.name)
-    Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto")
+    Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto", boundmass=LEAST, boundinertia=LEAST)
     option = Xml.SubElement(root, "option")
     world, equality = Xml.SubElement(root, "worldbody"), Xml.SubElement(root, "equality")
     thick = THICK * extent([stage.part for stage in placed]) * METRES[unit]
