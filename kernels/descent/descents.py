@@ -268,15 +268,3 @@ def descend(task: Task, kind: int, place: Array, x: Array, state: Array, curvatu
             reset_curvature(curvature)
     _copy(current.place, place)
     _copy(current.x, x)
-
-
-@kernel
-def rows_at(task: Task, kind: int, place: Array, x: Array, values: Array, slopes: Array) -> None:
-    """Compute the rows (r,) of one design that turns, and their gradients (n + 5, r) by places and unknowns."""
-    d = _empty_design(task)
-    _copy(place, d.place)
-    _copy(x, d.x)
-    columns_of(task, kind, d.place, d.row)
-    motion_of(d.row, task.cos, task.sin, d.motion)
-    _evaluate(task, kind, d, slopes)
-    _copy(d.values, values)

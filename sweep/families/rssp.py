@@ -69,7 +69,7 @@ def margins(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Colum
     n = len(designs)
     status = np.empty(n, np.uint8)
     least, turns, angle = np.empty(n), np.empty(n), np.empty(n)
-    rssp.margin(designs, status, least, turns, angle, None)
+    rssp.margin(designs, status, least, turns, angle)
     with np.errstate(all="ignore"):  # lengths that overflow have a status
         scale = designs[:, 1] ** 2
         # Rounding errors of sin^2 = (m^2 + n^2)/b^2, taken where m and n are largest; cos^2 has that of b^2 as well.

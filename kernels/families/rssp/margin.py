@@ -55,10 +55,9 @@ def least_q(r: Reduced) -> LeastQ:
 def margin(
     designs: Array,
     status: Status,
-    margin: Array | None,
-    rotatable: Array | None,
-    max_pressure_angle: Array | None,
-    phi_min: Array | None,
+    margin: Array,
+    rotatable: Array,
+    max_pressure_angle: Array,
 ) -> None:
     """Compute rotatability, margin and largest pressure angle of every design, exact.
 
@@ -69,11 +68,6 @@ def margin(
     margin : (n,) out, least Q/b^2 = least cos^2(pressure angle) over the turn; negative if the crank does not turn
     rotatable : (n,) out, 1 or 0; nan where undecidable
     max_pressure_angle : (n,) out [rad]; nan unless rotatable
-    phi_min : (n,) out [rad], crank angle in (-pi, pi] of the least Q
-
-    Notes
-    -----
-    Outputs of None are neither computed nor compiled.
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
@@ -81,15 +75,10 @@ def margin(
         code = turning_status(least.q, least.tolerance, r.valid)
         status[i] = code
         known = code != st.INVALID_INPUT
-        if margin is not None:
-            margin[i] = least.q / (r.b * r.b) if known else math.nan
-        if rotatable is not None:
-            rotatable[i] = (1.0 if least.q > 0.0 else 0.0) if known and code != st.UNDECIDABLE else math.nan
-        if max_pressure_angle is not None:
-            # atan2, not acos: acos loses half the digits near zero.
-            max_pressure_angle[i] = math.atan2(least.across, math.sqrt(least.q)) if code == st.OK else math.nan
-        if phi_min is not None:
-            phi_min[i] = math.atan2(least.sin, least.cos) if known else math.nan
+        margin[i] = least.q / (r.b * r.b) if known else math.nan
+        rotatable[i] = (1.0 if least.q > 0.0 else 0.0) if known and code != st.UNDECIDABLE else math.nan
+        # atan2, not acos: acos loses half the digits near zero.
+        max_pressure_angle[i] = math.atan2(least.across, math.sqrt(least.q)) if code == st.OK else math.nan
 
 
 _MOST_STEPS = 200

@@ -71,6 +71,7 @@ from kernels.families.rssr.sampling import (
     settle,
 )
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write
 from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI as TURN
 from kernels.types import CosSin
@@ -138,18 +139,12 @@ def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float,
 def _put(i: int, order: int, result: tuple[float, float, float, float], places: Places, heights: Heights) -> None:
     """Write height, place and the errors of both for one order of design i, where they are wanted."""
     best, place, bound, reach = result
-    _put_in(places.phi, order, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan has none
-    _put_in(places.error, order, i, bound)
-    _put_in(places.phi_error, order, i, reach)
+    write(places.phi, order - 1, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan has none
+    write(places.error, order - 1, i, bound)
+    write(places.phi_error, order - 1, i, reach)
     _put_height(heights.dpsi, i, best)
     _put_height(heights.d2psi, i, best)
     _put_height(heights.d3psi, i, best)
-
-
-@inline
-def _put_in(out: Array | None, order: int, i: int, value: float) -> None:
-    if out is not None:
-        out[order - 1, i] = value
 
 
 @inline

@@ -174,7 +174,7 @@ def test_limits_scale_and_mirror(a, e, f, alpha, over, exponent):
 
 def test_jitted_equals_plain_python():
     designs = rotating(20, 9)[:6]
-    for kernel, outputs in ((rssp.limits, 9), (rssp.margin, 4)):
+    for kernel, outputs in ((rssp.limits, 9), (rssp.margin, 3)):
         compiled, plain = (np.empty((outputs, len(designs))) for _ in range(2))
         states = np.empty((2, len(designs)), np.uint8)
         for k, (function, room) in enumerate(((kernel, compiled), (kernel.py_func, plain))):

@@ -251,7 +251,7 @@ def test_a_slider_by_itself_opens_as_its_margin_says():
     status, distance = np.empty(len(designs), np.uint8), np.empty(len(designs))
     rssp.opening(designs, status, distance)
     other = np.empty(len(designs), np.uint8)
-    rssp.margin(designs, other, None, None, None, None)
+    rssp.margin(designs, other, *np.empty((3, len(designs))))
     np.testing.assert_array_equal(status, other)
     assert set(np.unique(status)) >= {st.OK, st.NOT_ROTATABLE, st.INVALID_INPUT}
 
