@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from kernels.arithmetic.intrinsics import largest, smallest
-from kernels.families.rssr.closure import Array, reduce_design
+from kernels.families.rssr.closure import reduce_design
 from kernels.jit import kernel_fused
+from kernels.types import Array
 
 
 @kernel_fused

@@ -17,17 +17,11 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.curves.polynomials import approach, far_minimum, lowest_of_16, minimum, point, shortfall
-from kernels.families.rssr.closure import (
-    EPS,
-    Array,
-    Status,
-    closure_terms,
-    reduce_scaled,
-    unit_scale,
-    within_unit_range,
-)
+from kernels.families.rssr.closure import closure_terms
 from kernels.jit import inline, kernel
+from kernels.linkage.crank_closure import reduce_scaled, unit_scale, within_unit_range
 from kernels.linkage.verdict import turning_status
+from kernels.types import EPS, Array, Status
 
 BLOCK = 64
 # Within _NEAR of a minimum one step of Newton's method reaches it to the precision of float64.  Two steps from the

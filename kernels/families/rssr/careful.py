@@ -11,9 +11,9 @@ import math
 from typing import NamedTuple
 
 from kernels.arithmetic.intrinsics import largest
-from kernels.families.rssr.closure import EPS, closure_terms, follower, order_pair
+from kernels.families.rssr.closure import closure_terms, follower, order_pair
 from kernels.jit import inline, kernel
-from kernels.types import TWO_PI
+from kernels.types import EPS, TWO_PI
 
 _WIDEST = TWO_PI / 24.0
 _ATTEMPTS = 8

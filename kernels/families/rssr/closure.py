@@ -16,16 +16,8 @@ from typing import Any
 
 from kernels.arithmetic.intrinsics import largest
 from kernels.jit import inline, inline_fused
-from kernels.linkage.crank_closure import Reduced as Reduced
-from kernels.linkage.crank_closure import axial_terms as axial_terms
-from kernels.linkage.crank_closure import discriminant_tolerance as discriminant_tolerance
-from kernels.linkage.crank_closure import reduce_scaled as reduce_scaled
-from kernels.linkage.crank_closure import unit_scale as unit_scale
-from kernels.linkage.crank_closure import within_unit_range as within_unit_range
-from kernels.types import EPS as EPS
-from kernels.types import Array as Array
-from kernels.types import Numbers as Numbers
-from kernels.types import Status as Status
+from kernels.linkage.crank_closure import Reduced, reduce_scaled, unit_scale
+from kernels.types import Numbers
 
 
 @inline

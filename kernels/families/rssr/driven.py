@@ -43,9 +43,9 @@ from kernels.certified.jets import (
     sum_of,
     triple_harmonic,
 )
-from kernels.families.rssr.closure import Array, closure_terms, reduce_design
+from kernels.families.rssr.closure import closure_terms, reduce_design
 from kernels.jit import inline, kernel
-from kernels.types import EPS
+from kernels.types import EPS, Array
 
 # X, Y, W, R and Delta about one crank angle as series in s = sin z and m = 1 - cos z.
 # ``x0 + x1 s + x2 m`` is X, and Y and W alike; r0 ... r4 are the coefficients of 1, s, m, s m, m^2 in R, d0 ... d4

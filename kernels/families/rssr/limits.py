@@ -36,10 +36,10 @@ from kernels.families.rssr.block import (
     load_block,
     new_block,
 )
-from kernels.families.rssr.closure import EPS, Array, Status, closure_terms, follower
+from kernels.families.rssr.closure import closure_terms, follower
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
-from kernels.types import TWO_PI
+from kernels.types import EPS, TWO_PI, Array, Status
 
 LIMIT_NAMES = ("psi_ext", "psi_fold", "phi_ext", "phi_fold", "swing", "phi0", "stroke_ratio")
 FEWEST, MOST = 32, 8192  # samples of the sign of eta

@@ -44,7 +44,6 @@ from kernels.families.rssr.block import (
     singularity_distance,
 )
 from kernels.families.rssr.careful import Loop, careful_maximum
-from kernels.families.rssr.closure import Array, Status
 from kernels.families.rssr.sampling import (
     ERROR,
     FEWEST,
@@ -74,7 +73,7 @@ from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
 from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI as TURN
-from kernels.types import CosSin
+from kernels.types import Array, CosSin, Status
 
 Counts = NDArray[np.int64]
 PER_RHO, PER_RHO_JERK = 11.0, 18.0  # samples per distance of the nearest singularity, at least

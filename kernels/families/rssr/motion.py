@@ -20,16 +20,10 @@ from kernels.arithmetic.complex_step import arctan2, hypotenuse
 from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.arithmetic.sincos import sincos
 from kernels.families.rssr.closure import (
-    Array,
     ClosurePose,
-    Numbers,
-    Reduced,
     Rocker,
-    Status,
     acceleration,
     acceleration_fused,
-    axial_terms,
-    discriminant_tolerance,
     jerk,
     jerk_fused,
     place,
@@ -40,8 +34,10 @@ from kernels.families.rssr.closure import (
     velocity_fused,
 )
 from kernels.jit import inline, kernel, kernel_fused
+from kernels.linkage.crank_closure import Reduced, axial_terms, discriminant_tolerance
 from kernels.linkage.outputs import write
 from kernels.linkage.verdict import pose_status
+from kernels.types import Array, Numbers, Status
 
 # Pose outputs, each (n, m), and coordinates of the crank pin B and the rocker ball C; outputs of None are not computed.
 Outputs = namedtuple(

@@ -15,11 +15,12 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic import double_double as two
 from kernels.arithmetic.double_double import Twofold
-from kernels.families.rssr.closure import EPS, Array, Status, reduce_scaled, unit_scale
 from kernels.families.rssr.motion import Outputs
 from kernels.jit import inline, kernel
+from kernels.linkage.crank_closure import reduce_scaled, unit_scale
 from kernels.linkage.outputs import write
 from kernels.linkage.verdict import pose_status
+from kernels.types import EPS, Array, Status
 
 # Columns of the constants: high and low parts in units of the crank, mirrored to branch +1; then plain numbers.
 E, Y0, CA, K0, K1, K2, RHO, Z0, SA = range(0, 18, 2)

@@ -20,9 +20,9 @@ from kernels.arithmetic.vectors import Vector
 from kernels.curves.polynomials import rotate
 from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, W_SIZE, Y0, E
 from kernels.families.rssr.careful import Loop, rounding
-from kernels.families.rssr.closure import Array, follower
+from kernels.families.rssr.closure import follower
 from kernels.jit import inline, kernel
-from kernels.types import TWO_PI, CosSin
+from kernels.types import TWO_PI, Array, CosSin
 
 MOST_PEAKS = 8  # 16 samples cannot have more; a design with more goes to the careful search
 # Rows 960 bytes apart modulo 4096, so that they do not evict each other from the cache.

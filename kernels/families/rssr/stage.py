@@ -19,21 +19,10 @@ from kernels.families.rssr.block import (
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.closure import (
-    EPS,
-    Array,
-    Status,
-    acceleration,
-    closure_terms,
-    jerk,
-    place,
-    reduce_one,
-    rocker,
-    snap,
-    velocity,
-)
+from kernels.families.rssr.closure import acceleration, closure_terms, jerk, place, reduce_one, rocker, snap, velocity
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
+from kernels.types import EPS, Array, Status
 
 # The numbers of the closure in units of the crank, see :class:`kernels.linkage.crank_closure.Reduced`.
 # ``per_square``: 1/b^2.
