@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.arithmetic.complex_step import unit_near
 from kernels.arithmetic.vectors import Vector
-from kernels.curves.arc_roots import MOST as MOST
 from kernels.curves.arc_roots import arc_search
 from kernels.jit import inline, kernel
 from kernels.linkage.driven_ball import Crank, reduce_crank

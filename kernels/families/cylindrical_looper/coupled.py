@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.arithmetic.complex_step import magnitude
 from kernels.arithmetic.vectors import Vector, add, cross, dot
-from kernels.families.cylindrical_looper.closure import MOST, Loops, Reduced, chosen, place, reduce_design
+from kernels.curves.arc_roots import MOST
+from kernels.families.cylindrical_looper.closure import Loops, Reduced, chosen, place, reduce_design
 from kernels.families.cylindrical_looper.motion import Outputs, Slide, carried
 from kernels.jit import inline, kernel
 from kernels.linkage.driven_ball import Path, Swung, crank_pin, pin_path

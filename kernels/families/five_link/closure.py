@@ -30,7 +30,6 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
 from kernels.arithmetic.sincos import sincos
-from kernels.curves.arc_roots import MOST as MOST
 from kernels.curves.arc_roots import angle_at, arc_search, way_of
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, unit_scale

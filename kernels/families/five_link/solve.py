@@ -9,18 +9,9 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
+from kernels.curves.arc_roots import MOST
 from kernels.curves.polynomials import rotate
-from kernels.families.five_link.closure import (
-    MOST,
-    NONE,
-    ONE,
-    Joint,
-    all_roots,
-    axial_reach,
-    residual_size,
-    slope,
-    solutions,
-)
+from kernels.families.five_link.closure import NONE, ONE, Joint, all_roots, axial_reach, residual_size, slope, solutions
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, discriminant_tolerance
 from kernels.linkage.verdict import pose_status

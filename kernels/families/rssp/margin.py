@@ -24,10 +24,11 @@ from collections import namedtuple
 
 from kernels import status as st
 from kernels.curves.polynomials import minimum
-from kernels.families.rssp.motion import EPS, Reduced, place, reduce_design
+from kernels.families.rssp.motion import reduce_design
 from kernels.jit import inline, kernel
+from kernels.linkage.slider_closure import Reduced, place
 from kernels.linkage.verdict import turning_status
-from kernels.types import TWO_PI, Array, Status
+from kernels.types import EPS, TWO_PI, Array, Status
 
 # Smallest Q of the turn in squared units of the reduced design, its place, and the bound of its rounding error.
 # ``across``: distance of the coupler's ends across the slide line.

@@ -21,15 +21,9 @@ from kernels.arithmetic import double_double as two
 from kernels.arithmetic.complex_step import arctan2, unit_near
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import put_block, write
-from kernels.linkage.slider_closure import ClosurePose as ClosurePose
-from kernels.linkage.slider_closure import Reduced as Reduced
-from kernels.linkage.slider_closure import derivatives as derivatives
-from kernels.linkage.slider_closure import place as place
-from kernels.linkage.slider_closure import reduce_scaled
-from kernels.linkage.slider_closure import tolerance as tolerance
+from kernels.linkage.slider_closure import Reduced, derivatives, place, reduce_scaled, tolerance
 from kernels.linkage.verdict import pose_status
-from kernels.types import EPS as EPS
-from kernels.types import Array, Status
+from kernels.types import EPS, Array, Status
 
 
 @inline

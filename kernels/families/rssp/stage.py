@@ -13,11 +13,11 @@ from kernels.arithmetic.intrinsics import largest, power_below, smallest
 from kernels.chains.form import STRIDE, Form, Travel
 from kernels.curves.polynomials import far_minimum, point
 from kernels.families.rssp.margin import least_q
-from kernels.families.rssp.motion import EPS, place, reduce_design
+from kernels.families.rssp.motion import reduce_design
 from kernels.jit import inline, kernel
-from kernels.linkage.slider_closure import Reduced, reduce_along, root_derivatives
+from kernels.linkage.slider_closure import Reduced, place, reduce_along, root_derivatives
 from kernels.linkage.verdict import turning_status
-from kernels.types import Array, Status
+from kernels.types import EPS, Array, Status
 
 # The numbers of :class:`kernels.linkage.slider_closure.Reduced`.
 # ``per_square``: 1/b^2.
