@@ -91,17 +91,8 @@ class Elimination:
         lam = np.array([math.atan2(-y, x) for x, y in x[:, :2].tolist()])
         out[:, along] = (x[:, 2] * x[:, 0] + x[:, 3] * x[:, 1]) * ratio
         out[:, across] = (x[:, 3] * x[:, 0] - x[:, 2] * x[:, 1]) * ratio
-        out[:, offset], out[:, line] = x[:, 4], self.turned(lam)
+        out[:, offset], out[:, line] = x[:, 4], lam
         return out
-
-    def turned(self, lam: Array) -> Array:
-        """Return the direction with the whole turns that put it within its bounds, if possible."""
-        name = f"{self.guide.direction}{self.last}"
-        if name not in self.problem.variables:
-            return lam
-        k = self.problem.variables.index(name)
-        middle = 0.5 * (self.problem.lower[k] + self.problem.upper[k])
-        return np.asarray(lam - 2.0 * np.pi * np.round((lam - middle) / (2.0 * np.pi)), np.float64)
 
 
 def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimination | None:
@@ -137,11 +128,11 @@ def elimination(problem: Problem, tolerance: Tolerance | None = None) -> Elimina
 
 
 def within_turn(problem: Problem, designs: Array) -> Array:
-    """Return the designs with whole turns added to angles that put them within their bounds."""
+    """Return the designs with whole turns added to angles that put them within their bounds, if possible."""
     out = designs.copy()
     for k, name in enumerate(problem.variables):
         column = problem.family.parameter_names.index(name)
-        if problem.family.parameters[column].unit == "angle" and problem.span[k] >= 2.0 * math.pi:
+        if problem.family.parameters[column].unit == "angle":
             middle = problem.lower[k] + 0.5 * problem.span[k]
             out[:, column] -= 2.0 * math.pi * np.round((out[:, column] - middle) / (2.0 * math.pi))
     return out
