@@ -151,6 +151,12 @@ def _rounding(target: Array, x: Array) -> float:
 
 
 @inline
+def _among(points: NDArray[np.int64], j: int) -> bool:
+    """Tell whether j is one of the four points."""
+    return bool((points[0] == j) | (points[1] == j) | (points[2] == j) | (points[3] == j))
+
+
+@inline
 def _exchange(
     target: Array,
     dx: Array,
@@ -194,7 +200,9 @@ def _exchange(
                 r = abs(target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2])
                 if r > worst_size:
                     worst, worst_size = j, r
-        if worst < 0 or worst_size <= abs(level) * (1.0 + 1e-9) + rounding:
+        # A point of the reference exceeds the level by the rounding of the elimination alone: neighbours among the four
+        # make it ill-conditioned, and the point would replace itself for ever.
+        if worst < 0 or worst_size <= abs(level) * (1.0 + 1e-9) + rounding or _among(points, worst):
             return True
         # Stiefel's rule: the new row in terms of the reference decides which point leaves; the level can only rise.
         sign = math.copysign(1.0, target[worst] + x[0] * dy[worst] + x[1] * dx[worst] - x[2])
