@@ -11,8 +11,10 @@ angle); docs/rssr.md, section 4.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.arithmetic.intrinsics import largest, smallest
@@ -31,6 +33,8 @@ _NEAR, _SURE = 1e-5, 1e-4
 E, Y0, CA, K0, K1, K2, W_SIZE, COUPLER, ROCKER, Z0, SA, BRANCH, VALID = (k * BLOCK for k in range(13))
 C1, S1, C2, S2, COS, SIN, AGAIN, DELTA, CURVATURE, TOLERANCE, ACROSS = (k * BLOCK for k in range(13, 24))
 ROWS = 24
+_SEARCHED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # rows that a search for maxima needs
+Counts: TypeAlias = NDArray[np.int64]
 
 
 @inline
@@ -143,6 +147,25 @@ def singularity_distance(count: int, at: Array) -> None:
         size, own = focal + math.sqrt(largest(focal * focal - sa * sa, 0.0)), 1.0 + abs(ca)
         axis = 2.0 * abs(size - own) / (size + own)
         at[k + ACROSS] = smallest(math.sqrt(smallest(near, far)), axis)
+
+
+@inline
+def keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Status) -> int:
+    """Move the designs of a block that turn to its front; return their number.  ``who`` gets their old places.
+
+    A design that does not turn costs its verdict only.
+    """
+    block = 0
+    for k in range(count):
+        i = start + k
+        status[i] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
+        who[block] = k
+        block += 1 if status[i] == st.OK else 0
+    if block < count:
+        for row in _SEARCHED:
+            for i in range(block):
+                at[row + i] = at[row + who[i]]
+    return block
 
 
 @inline

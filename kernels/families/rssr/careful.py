@@ -11,12 +11,15 @@ import math
 from typing import NamedTuple
 
 from kernels.arithmetic.intrinsics import largest
+from kernels.curves.polynomials import far_minimum, point
+from kernels.families.rssr.block import C1, C2, CA, COS, DELTA, K0, K1, K2, S1, S2, SIN, W_SIZE, Y0, E
 from kernels.families.rssr.closure import closure_terms, follower, order_pair
 from kernels.jit import inline, kernel
-from kernels.types import EPS, TWO_PI
+from kernels.types import EPS, TWO_PI, Array
 
 _WIDEST = TWO_PI / 24.0
 _ATTEMPTS = 8
+NONE = (math.nan, math.nan, math.nan, math.nan)  # height, place, and the errors of both, where nothing is found
 
 
 class Loop(NamedTuple):
@@ -107,6 +110,24 @@ def careful_maximum(
         before = best
         fineness *= 0.5
     return best, place, math.inf, math.inf, False
+
+
+@inline
+def careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float, float, float, float], bool]:
+    """Find the maximum by marching: height, place, errors of both (nan if not found), and whether it was found."""
+    u, v = at[k + COS], at[k + SIN]
+    c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
+    here = point(c1, s1, c2, s2, u, v)
+    fu, fv = far_minimum(c2, s2, u, v)
+    there = point(c1, s1, c2, s2, fu, fv)
+    rho1 = math.sqrt(2.0 * at[k + DELTA] / here.curvature) if here.curvature > 0.0 else math.inf
+    rise = at[k + DELTA] + max(there.value - here.value, 0.0)
+    rho2 = math.sqrt(2.0 * rise / there.curvature) if there.curvature > 0.0 else math.inf
+    of = Loop(at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE])
+    best, place, error, reach, agreed = careful_maximum(
+        order, of, math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target
+    )
+    return ((best, place, error, reach) if agreed else NONE), agreed
 
 
 @inline

@@ -15,7 +15,7 @@ from collections import namedtuple
 from typing import Any
 
 from kernels.arithmetic.intrinsics import largest
-from kernels.jit import inline, inline_fused
+from kernels.jit import inline
 from kernels.linkage.crank_closure import Reduced, reduce_scaled, unit_scale
 from kernels.types import Numbers
 
@@ -120,13 +120,6 @@ def snap(to: Rocker, at: ClosurePose, first: First, second: Second, j: Any) -> A
     by_p = p * (-4.0 * g_phps + p * (6.0 * (at.w1 - second.g_phph) - p * (4.0 * g_phps + w * p)))
     by_q = q * (6.0 * g_phphps + p * (12.0 * g_phpsps - 6.0 * t * p) + 3.0 * w * q)
     return (second.g_phph - by_p - by_q - 4.0 * (g_phps + w * p) * j) * to.per_t
-
-
-place_fused = inline_fused(place)
-rocker_fused = inline_fused(rocker)
-velocity_fused = inline_fused(velocity)
-acceleration_fused = inline_fused(acceleration)
-jerk_fused = inline_fused(jerk)
 
 
 @inline

@@ -14,36 +14,19 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kernels import status as st
-from kernels.curves.polynomials import far_minimum, point
 from kernels.families.rssr.block import (
     ACROSS,
     BLOCK,
-    C1,
-    C2,
-    CA,
-    COS,
-    DELTA,
-    K0,
-    K1,
-    K2,
-    S1,
-    S2,
-    SA,
-    SIN,
-    TOLERANCE,
-    VALID,
-    W_SIZE,
-    Y0,
-    E,
+    Counts,
+    keep_what_turns,
     least_delta,
     load_block,
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.careful import Loop, careful_maximum
+from kernels.families.rssr.careful import NONE, careful
 from kernels.families.rssr.sampling import (
     ERROR,
     FEWEST,
@@ -71,16 +54,12 @@ from kernels.families.rssr.sampling import (
 )
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
-from kernels.linkage.verdict import turning_status
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin, Status
 
-Counts = NDArray[np.int64]
 PER_RHO, PER_RHO_JERK = 11.0, 18.0  # samples per distance of the nearest singularity, at least
 # A literal number in a call is a type of its own, for which a helper is compiled once more: this is no literal.
 _ZERO: Any = np.int64(0)
-_NONE = (math.nan, math.nan, math.nan, math.nan)
-_NEEDED = (E, Y0, CA, K0, K1, K2, W_SIZE, SA, C1, S1, C2, S2, COS, SIN, DELTA)  # rows that the search needs
 
 
 class Search(NamedTuple):
@@ -117,24 +96,6 @@ def _new_search() -> Search:
 
 
 @inline
-def _careful(at: Array, k: int, order: int, target: float) -> tuple[tuple[float, float, float, float], bool]:
-    """Find the maximum by marching: height, place, errors of both (nan if not found), and whether it was found."""
-    u, v = at[k + COS], at[k + SIN]
-    c1, s1, c2, s2 = at[k + C1], at[k + S1], at[k + C2], at[k + S2] + 1e-300
-    here = point(c1, s1, c2, s2, u, v)
-    fu, fv = far_minimum(c2, s2, u, v)
-    there = point(c1, s1, c2, s2, fu, fv)
-    rho1 = math.sqrt(2.0 * at[k + DELTA] / here.curvature) if here.curvature > 0.0 else math.inf
-    rise = at[k + DELTA] + max(there.value - here.value, 0.0)
-    rho2 = math.sqrt(2.0 * rise / there.curvature) if there.curvature > 0.0 else math.inf
-    of = Loop(at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2], at[k + W_SIZE])
-    best, place, error, reach, agreed = careful_maximum(
-        order, of, math.atan2(v, u), rho1, math.atan2(fv, fu), rho2, target
-    )
-    return ((best, place, error, reach) if agreed else _NONE), agreed
-
-
-@inline
 def _put(i: int, order: int, result: tuple[float, float, float, float], places: Places, heights: Heights) -> None:
     """Write height, place and the errors of both for one order of design i, where they are wanted."""
     best, place, bound, reach = result
@@ -150,25 +111,6 @@ def _put(i: int, order: int, result: tuple[float, float, float, float], places: 
 def _put_height(out: Array | None, i: int, value: float) -> None:
     if out is not None:
         out[i] = value
-
-
-@inline
-def _keep_what_turns(start: int, count: int, at: Array, who: Counts, status: Status) -> int:
-    """Move the designs of a block that turn to its front; return their number.  ``who`` gets their old places.
-
-    A design that does not turn costs its verdict only.
-    """
-    block = 0
-    for k in range(count):
-        i = start + k
-        status[i] = turning_status(at[k + DELTA], at[k + TOLERANCE], at[k + VALID] != 0.0)
-        who[block] = k
-        block += 1 if status[i] == st.OK else 0
-    if block < count:
-        for row in _NEEDED:
-            for i in range(block):
-                at[row + i] = at[row + who[i]]
-    return block
 
 
 @inline
@@ -230,7 +172,7 @@ def _maxima_of(
         if worst < math.inf:
             result = _highest(begin, end, m)
         else:
-            result, agreed = _careful(at, i, order, target)
+            result, agreed = careful(at, i, order, target)
             if not agreed:
                 status[start + who[i]] = st.NOT_CONVERGED
         _put(start + who[i], order, result, places, heights)
@@ -274,10 +216,10 @@ def true_maxima(
         count = min(BLOCK, designs.shape[0] - start)
         load_block(designs, start, count, at)
         least_delta(count, at)
-        block = _keep_what_turns(start, count, at, who, status)
+        block = keep_what_turns(start, count, at, who, status)
         for i in range(start, start + count if block < count else start):
             for order in range(1, 4):
-                _put(i, order, _NONE, places, asked)
+                _put(i, order, NONE, places, asked)
         padded = (block + 7) & ~7  # whole vectors; what stands in the surplus is never read
         singularity_distance(padded, at)
         if max_abs_dpsi is not None and max_abs_d2psi is not None:

@@ -23,17 +23,13 @@ from kernels.families.rssr.closure import (
     ClosurePose,
     Rocker,
     acceleration,
-    acceleration_fused,
     jerk,
-    jerk_fused,
     place,
-    place_fused,
     reduce_design,
-    rocker_fused,
+    rocker,
     velocity,
-    velocity_fused,
 )
-from kernels.jit import inline, kernel, kernel_fused
+from kernels.jit import inline, inline_fused, kernel, kernel_fused
 from kernels.linkage.crank_closure import Reduced, axial_terms, discriminant_tolerance
 from kernels.linkage.outputs import write
 from kernels.linkage.verdict import pose_status
@@ -191,6 +187,13 @@ def pressure_ellipse(designs: Array, ellipse: Array) -> None:
 
 Indices: TypeAlias = NDArray[np.int64]
 
+# The helpers of the loop below are contracted like the loop itself: a product and a sum become one instruction.
+place_fused = inline_fused(place)
+rocker_fused = inline_fused(rocker)
+velocity_fused = inline_fused(velocity)
+acceleration_fused = inline_fused(acceleration)
+jerk_fused = inline_fused(jerk)
+
 
 @kernel_fused
 def dense_maxima(
@@ -222,7 +225,6 @@ def dense_maxima(
     """
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
-        # The helpers of this loop are contracted like the loop itself: a product and a sum become one instruction.
         least, m1, m2, m3 = 1e300, 0.0, 0.0, 0.0
         for j in range(cos_phi.size):
             place = place_fused(r.e, r.y0, r.ca, r.k0, r.k1, r.k2, cos_phi[j], sin_phi[j])
