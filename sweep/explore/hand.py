@@ -117,7 +117,10 @@ class Hand:
             if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise InputError(name, value, "a finite number", "explore")
         design = {**self.first, **{name: float(value) for name, value in given.items()}}  # type: ignore[arg-type]
-        design_matrix(self.family, design)
+        try:
+            design_matrix(self.family, design)
+        except InputError as error:  # the page has no columns and rows
+            raise InputError(error.name, error.value, error.allowed, "explore") from None
         return design
 
     def answer(self, designs: Sequence[Mapping[str, object]], names: Sequence[str]) -> dict[str, Any]:
@@ -209,9 +212,11 @@ def of_study(study: Study) -> Hand:
 
 
 def of_results(folder: Path) -> Hand:
-    """Return the page state of a dataset: with its result, and its reference design pinned."""
+    """Return the page state of a dataset: with its result, or a design of its study; the reference design is pinned."""
     data = read_dataset(folder)
-    return Hand(data, data.folder, chosen(folder).design, _reference(data.study))
+    empty = data.optimum is None and not data.counts.get(codes.OK, 0)
+    first = of_study(data.study).first if empty else chosen(folder).design
+    return Hand(data, data.folder, first, _reference(data.study))
 
 
 def _reference(study: Study) -> dict[str, Design]:

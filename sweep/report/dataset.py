@@ -278,9 +278,12 @@ def chosen(folder: str | Path, design: str | int | None = None) -> ChosenDesign:
     if design == "best" or (design == "reference" and data.optima is None) or (design is None and data.optimum is None):
         data, _, _ = gather(path)  # reads all rows
     row = {"optimum": data.optimum, "reference": data.reference, "best": data.best, None: data.result}[design]
+    if row is None and design is None:
+        allowed = "at least one; or name a design: reference, or a number of the column design"
+        raise InputError("designs within all limits", 0, allowed, str(folder))
     if row is None:
         allowed = f"one this dataset has, of {', '.join(ROLES)}, or a number of the column design"
-        raise InputError("design", design or "result", allowed, str(folder))
+        raise InputError("design", design, allowed, str(folder))
     return _chosen(data, row)
 
 

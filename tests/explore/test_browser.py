@@ -151,6 +151,23 @@ def test_keyboard_alone(opened):
     until(lambda: "in hand" in page.inner_text("#said") or page.evaluate("past.length") >= 3)
 
 
+def test_a_refused_value_is_told_in_the_words_of_the_page_and_widens_no_slider(opened):
+    page = opened()
+    ends = page.evaluate("[rows.a.slider.min, rows.a.slider.max].map(Number)")
+    page.fill("#d-a", "-5")
+    page.keyboard.press("Enter")
+    said = "explore: a = -5.0; allowed: a positive length; shown is the design before"
+    until(lambda: page.inner_text("#said") == said)
+    assert page.evaluate("[rows.a.slider.min, rows.a.slider.max].map(Number)") == ends
+    page.fill("#d-a", "1e9")
+    page.keyboard.press("Enter")
+    until(lambda: page.evaluate("Number(rows.a.slider.max)") == 1e9 and not page.evaluate("asking"))
+    for _ in range(2):
+        page.click("#undo")
+    until(lambda: page.inner_text("#said") == "" and not page.evaluate("asking"))
+    assert page.evaluate("[rows.a.slider.min, rows.a.slider.max].map(Number)") == ends
+
+
 def test_click_on_a_cell_takes_its_best_design_in_hand(opened, folder):
     page = opened()
     until(lambda: page.locator("#cells rect").count() > 0)

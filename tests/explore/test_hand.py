@@ -18,6 +18,7 @@ from sweep.explore.cells import cells
 from sweep.explore.changes import dragged
 from sweep.explore.hand import of_study
 from sweep.explore.server import Server, page_text
+from sweep.report.dataset import chosen
 from sweep.study import study_from_data
 from tests.support.report_dataset import study_data, write_dataset
 
@@ -65,6 +66,16 @@ def test_a_run_without_feasible_designs_says_so_and_draws_no_empty_field(tmp_pat
     hand = in_hand(str(sweep.run(study_from_data(data, "study.toml"), out=tmp_path / "designs", jobs=1)))
     assert hand.page()["columns"] == []
     assert "No design of the run keeps all limits." in page_text(hand)
+
+
+def test_a_run_without_any_design_is_taken_in_hand_as_its_study_is(tmp_path):
+    data = study_data(limits={"stroke": {"min": 500, "unit": "mm"}}, optimise=None)
+    folder = sweep.run(study_from_data(data, "study.toml"), out=tmp_path / "designs", jobs=1)
+    hand = in_hand(str(folder))
+    assert hand.first == of_study(hand.study).first and hand.page()["empty"]
+    assert [row["states"] for row in hand.answer([hand.first], ["in hand"])["limits"]] == [["missed"]]
+    with pytest.raises(InputError, match="designs within all limits = 0; allowed: at least one; or name a design"):
+        chosen(folder)
 
 
 def test_what_is_neither_a_place_nor_a_family_is_told():

@@ -15,7 +15,9 @@ function say(text, wrong = false) {
 }
 
 async function ask(what, content, options = {}) {
-  const reply = await fetch(what, { method: "POST", body: JSON.stringify(content), ...options });
+  const reply = await fetch(what, { method: "POST", body: JSON.stringify(content), ...options }).catch((error) => {
+    throw error.name === "AbortError" ? error : new Error("no answer: does sweep explore still run in the shell?");
+  });
   if (!reply.ok) throw new Error((await reply.json().catch(() => ({ error: `refused: ${reply.status}` }))).error);
   return reply;
 }
@@ -35,7 +37,7 @@ async function renew() {
       document.body.dataset.milliseconds = performance.now() - begun;
       document.body.dataset.answers = Number(document.body.dataset.answers ?? 0) + 1;
       say(found.status[0] || note, found.status[0] !== "");
-    } catch (error) { say(error.message, true); }
+    } catch (error) { say(`${error.message}; shown is the design before`, true); }
   } while (again);
   asking = false;
 }
@@ -128,14 +130,16 @@ function take(other, text) {
   return renew();
 }
 
-// Write a dimension into its field; a slider whose range is too narrow is widened.
+// Write a dimension into its field; a slider whose range is too narrow is widened, but not to values that are refused.
 function put(range) {
   const row = rows[range.name], wide = Math.abs(range.high - range.low) * range.factor;
   const exact = design[range.name] * range.factor, value = Math.abs(exact) < 1e-12 * wide ? 0 : exact; // rounding of zero
   row.field.value = Number(value.toPrecision(7));
   if (!row.slider) return;
-  const ends = [Math.min(Number(row.slider.min), value), Math.max(Number(row.slider.max), value)];
-  [row.slider.min, row.slider.max] = ends;
+  if (!range.positive || value > 0) {
+    const ends = [Math.min(Number(row.slider.min), value), Math.max(Number(row.slider.max), value)];
+    [row.slider.min, row.slider.max] = ends;
+  }
   row.slider.value = value;
 }
 
@@ -191,7 +195,11 @@ function undo() {
   design = past.pop();
   note = "";
   by("undo").disabled = !past.length;
-  for (const range of page.ranges) put(range);
+  for (const range of page.ranges) {
+    const { slider } = rows[range.name];
+    if (slider) [slider.min, slider.max] = [range.low * range.factor, range.high * range.factor];
+    put(range);
+  }
   renew();
 }
 
