@@ -29,6 +29,7 @@ NEIGHBOURS = TWO_PI / 64.0  # largest distance of maxima of neighbouring pieces 
 PLACED = 1e-8  # coarsest accuracy with places: tops that differ by less are equally high, and the first of them counts
 EDGE = 2.0**17  # times EPS of the size: change over NARROWEST/4 of a curve with a slope of six sizes per radian
 LEVEL = 16.0  # times EPS of a value: most by which the poses of a level curve miss the polynomial through them, 10.7
+EVEN = 6.0  # the same of one whose poses are all equal: what the claimed error of a constant leaves for it
 AGAIN = 8.0  # factor from that difference to the claimed error: poses may see only 1/8 of a kink between them
 SLOPE = 2.0 * (NODES - 1) ** 2  # bound of the slope of a polynomial bounded by 1 on a panel of width 1 (Markov)
 
@@ -94,7 +95,8 @@ def climbed(curves: CurveValues, panels: Panels, n: int, mode: int, target: floa
         np.maximum.at(best, halves.row, halves.peak)
         tolerance = np.maximum(ALLOWED * aim * size, 4.0 * EPS * np.abs(best))[halves.row]
         narrow = halves.high - halves.low < NARROWEST
-        top = _tops(halves, mode, AGAIN * miss)
+        # A level piece is as high as one beside it whose polynomial is rounded.
+        top = _tops(halves, mode, AGAIN * np.where(miss > 0.0, miss, EVEN * EPS * np.abs(best)[halves.row]))
         settled, at_end = miss <= tolerance, (top.phi <= halves.low) | (top.phi >= halves.high)
         if locate:
             settled &= (top.err_phi <= aim) | at_end | (miss <= level[halves.row])
@@ -217,6 +219,8 @@ def fitted(row: Indices, low: Array, high: Array, values: Array, mode: int) -> P
     heights, every = measured(values, mode), np.arange(row.size)
     top = heights.argmax(axis=1)
     series: Array = product(values, basis()[1].T)
+    level = np.flatnonzero(np.ptp(values, axis=1) == 0.0)  # a dwell, a count: not halved until its rounding agrees
+    series[level, 0], series[level, 1:] = values[level, 0], 0.0
     return Panels(row, low, high, series, heights[every, top], places(low, high)[every, top], np.zeros(row.size))
 
 

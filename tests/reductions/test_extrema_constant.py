@@ -8,6 +8,9 @@ import pytest
 import sweep
 from kernels import status as st
 from sweep.families import family
+from sweep.numerics.chebyshev import NODES
+from sweep.numerics.panel_search import climbed, fitted
+from sweep.reductions.panels import STEADY
 
 N = 60
 PHI = np.linspace(0.0, 2.0 * np.pi, 257)
@@ -106,3 +109,20 @@ def test_the_place_on_a_constant_may_be_any_angle(accuracy):
     found = sweep.summarise("inverted_slider_crank", slots, names, accuracy=accuracy)
     assert (found.status == st.OK).all()
     assert (found[[f"err_{name}" for name in names]] == np.pi).all(axis=None)
+
+
+@pytest.mark.parametrize("mode", [0, 1, -1])
+def test_a_level_curve_is_halved_once(mode):
+    """Polynomials through equal poses are off by their rounding: panels were halved until 48 of them were small."""
+    value, edges, asked = 1.0 / 3.0, np.linspace(0.0, 2.0 * np.pi, 65), []
+
+    def curves(row, phi, middle):
+        asked.append(phi.size)
+        return np.full(phi.shape, value)
+
+    row = np.zeros(64, np.int64)
+    panels = fitted(row, edges[:-1], edges[1:], np.full((64, NODES), value), mode)
+    top, _ = climbed(curves, panels, 1, mode, 1e-8, False)
+    assert top.value[0] == (-value if mode == -1 else value)
+    assert 0.0 < top.err[0] <= STEADY * 2.0**-53 * value  # what a constant may claim without being NOT_CONVERGED
+    assert sum(asked) == 2 * 64 * (NODES + 1)  # both halves, and a pose at each one's top
