@@ -7,6 +7,7 @@ FOLDER/figures/price.svg.
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.jobs.progress import Phases, Say, unsaid
 from sweep.optimise.manufacture.margins import inequalities
-from sweep.optimise.manufacture.tolerance import sampled_designs, within_limits
+from sweep.optimise.manufacture.sample import Sampler, keeping
 from sweep.optimise.starts.posing import problem_of
 from sweep.report.dataset import read_dataset
 from sweep.report.figures import LIMIT, OPTIMUM, QUIET, REFERENCE, WIDTH, new_figure
@@ -58,8 +59,9 @@ def price(study: Study, designs: dict[str, Array], say: Say = unsaid) -> pd.Data
     for name, design in designs.items():
         say("figure", len(rows), len(designs), "mechanisms")
         drawn = design_outputs(study.family, design[None, :], ["max_abs_d2s", "max_abs_dev"], study.accuracy)
-        sample = sampled_designs(study.family, design, study.tolerance, 1, SAMPLES)
-        made, good = within_limits(problem, inequalities(problem), sample)
+        sampler = Sampler(problem, replace(study.tolerance, samples=SAMPLES), 1)
+        made = sampler.outputs(design, [limit.output for limit in inequalities(problem)])
+        good = keeping(inequalities(problem), made)
         deviation = np.nan_to_num(made["max_abs_dev"].astype(np.float64), nan=np.inf)
         value = dict(zip(names, design.tolist(), strict=True))
         rows.append(

@@ -62,7 +62,12 @@ class Level:
     @property
     def batch(self) -> int:
         """Number of designs per call of the route."""
-        return int(min(max(1e9 * BATCH_SECONDS / max(self.ns_per_design, 1.0), FEWEST), BLOCK))
+        return batch_size(self.ns_per_design)
+
+
+def batch_size(ns_per_design: float) -> int:
+    """Choose the number of designs that are computed between two looks at the stop flag."""
+    return int(min(max(1e9 * BATCH_SECONDS / max(ns_per_design, 1.0), FEWEST), BLOCK))
 
 
 @dataclass(frozen=True)

@@ -308,3 +308,32 @@ def metadata(path: Path) -> dict[bytes, bytes]:
         return dict(pq.read_schema(path).metadata or {}) if path.is_file() else {}
     except (pa.ArrowException, OSError, ValueError):  # Arrow raises OSError for damaged bytes, too
         return {}
+
+
+class Kept:
+    """Finished parts of a search by name, as JSON; without a path they are kept in memory only.
+
+    Parameters
+    ----------
+    path : path of the file
+    key : hash of everything that the search depends on; parts of a search with another key are discarded
+    """
+
+    def __init__(self, path: Path | None = None, key: str = "") -> None:
+        self.path, self.key, self.parts = path, key, dict[str, Any]()
+        try:
+            content = json.loads(path.read_bytes()) if path is not None and path.is_file() else {}
+            self.parts = content["parts"] if content.get("key") == key else {}
+        except (ValueError, KeyError, AttributeError):  # damaged: start again
+            self.parts = {}
+
+    def note(self, name: str, part: Any) -> None:
+        """Keep a finished part."""
+        self.parts[name] = part
+        if self.path is not None:
+            write_atomically(self.path, json.dumps({"key": self.key, "parts": self.parts}).encode())
+
+    def forget(self) -> None:
+        """Remove the file of a finished search."""
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numba.core.event import Event, Listener, install_listener
 
-from sweep.chunks.cascade import CALL_SECONDS, levels
+from sweep.chunks.cascade import CALL_SECONDS, Dropped, levels
 from sweep.chunks.plan import Pilot, choose_chunk_size, describe_columns, pilot, pilot_at, row_bytes
 from sweep.errors import BudgetError, how_many
 from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
+from sweep.families.base import Array
 from sweep.families.names import is_error, is_flag
 from sweep.jobs.progress import Phases
+from sweep.optimise.front import pareto
+from sweep.optimise.local.start import search
+from sweep.optimise.manufacture import robust
+from sweep.optimise.manufacture.margins import inequalities
+from sweep.optimise.manufacture.sample import Sampler
+from sweep.optimise.multistart.survey import CONFIRMATIONS, GROUP_SIZE
+from sweep.optimise.problem.statement import Problem
+from sweep.optimise.starts.dataset import SAMPLES, random_designs, sample_seconds
+from sweep.optimise.starts.posing import problem_of
+from sweep.optimise.starts.proportions import POPULATIONS, SWEPT
 from sweep.reductions.steps import certified_names, is_windowed
 from sweep.study.load import study_from_data, with_accuracy
 from sweep.study.study import OptimiseSettings, Study
@@ -49,6 +60,7 @@ THREAD_EFFICIENCY = 0.97
 TYPICAL_LOOKS, TRIED_LOOKS, POPULATION_LOOKS = 300, 40, 3000
 TRIED_SECONDS = 0.5
 NEAR_LOOKS = 75  # evaluations of a search of a front, which starts at its neighbour's optimum: 56 and 73 were measured
+MADE_SAMPLES = 3  # samples of mechanisms of the end of a search with margins for tolerances; 1 to 5 were measured
 REPORT_SECONDS = 5.0
 
 
@@ -124,14 +136,6 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     settings = study.optimise
     if settings is None or study.objective is None:
         return ()
-    # scipy's minimisers take as long as numpy to import; a study without a search does not wait for them
-    from sweep.optimise.front import pareto
-    from sweep.optimise.local.start import search
-    from sweep.optimise.multistart.survey import CONFIRMATIONS, GROUP_SIZE
-    from sweep.optimise.starts.dataset import SAMPLES, random_designs, sample_seconds
-    from sweep.optimise.starts.posing import problem_of
-    from sweep.optimise.starts.proportions import POPULATIONS, SWEPT
-
     designs = known.kept if len(known.kept) else random_designs(study, 1, settings.seed)
     if not len(designs):
         return ()
@@ -152,14 +156,39 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
         expected = 0.0 if len(known.kept) else sample
         all_samples = -(-SAMPLES * settings.starts // GROUP_SIZE) * sample
         rows = [("search", expected + settings.starts * typical, all_samples + settings.starts * most)]
+    whole, sample = _made_seconds(study, problem, designs[0])
     if study.wanted_yield is not None:
         expected, longest = (n * seconds + POPULATIONS * population for n in _robust_looks(settings, settled))
-        rows.append(("tolerances", expected, 2.0 * longest))
+        few, many = (
+            n * min(robust.CONTINUED, settings.starts) * sample / jobs for n in (MADE_SAMPLES, robust.CORRECTIONS + 1)
+        )
+        rows.append(("tolerances", expected + few, 2.0 * longest + many))
     if study.pareto is not None:
         count = pareto.searches(study.pareto)
         limit = min(study.pareto.looks, settings.looks) * seconds
         rows.append(("front", count * min(NEAR_LOOKS * seconds, limit), count * limit))
+    if study.tolerance is not None:
+        rows.append(("what is made", whole / jobs, whole))
     return (*rows, ("tables and report", REPORT_SECONDS, 4.0 * REPORT_SECONDS))
+
+
+def _made_seconds(study: Study, problem: Problem, design: Array) -> tuple[float, float]:
+    """Time what is made of a design (P,): seconds of one worker for all tables about it, and for one sample."""
+    if study.tolerance is None:
+        return 0.0, 0.0
+    shown = 1 + (study.reference is not None)
+    limits, told = inequalities(problem), [0]
+    names = [limit.output for limit in limits] or list(study.want)
+    Sampler(problem, study.tolerance, 0).outputs(design, names, count=1)  # compiles
+    begin = time.process_time()
+    sampler = Sampler(
+        problem, study.tolerance, 0, lambda: time.process_time() - begin > TRIED_SECONDS, tell=told.append
+    )
+    with suppress(Dropped):
+        sampler.outputs(design, names)
+    seconds = (time.process_time() - begin) / sum(told)
+    shares = shown + (study.wanted_yield is not None) if limits else 0
+    return sampler.planned(design, shares, shown) * seconds, study.tolerance.samples * seconds
 
 
 def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int, int]:
@@ -170,8 +199,6 @@ def _robust_looks(settings: OptimiseSettings, settled: int | None) -> tuple[int,
     after some number of evaluations, each round takes at most that many.  Without populations no more searches are
     begun than there are starts.
     """
-    from sweep.optimise.manufacture import robust
-
     starts = robust.MOST_BASINS if settings.by_populations else min(robust.MOST_BASINS, settings.starts)
     rounds, first_budget = starts * robust.ROUNDS, min(robust.FIRST_BUDGET, settings.looks)
     continued, corrections = min(robust.CONTINUED, starts), robust.CORRECTIONS * robust.ROUNDS

@@ -40,7 +40,12 @@ def stages_of(study: Study) -> tuple[str, ...]:
     if settings is not None:
         robust = study.wanted_yield is not None
         optional = {"search": True, "tolerances": settings.by_populations and robust, "robust design": robust}
-        optional |= {"tables": True, "proof": settings.prove is not None, "front": study.pareto is not None}
+        optional |= {
+            "tables": True,
+            "what is made": study.tolerance is not None,
+            "proof": settings.prove is not None,
+            "front": study.pareto is not None,
+        }
         labels += [name for name, wanted in optional.items() if wanted]
     return tuple(labels)
 

@@ -6,6 +6,7 @@ import json
 import math
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
+from sweep.chunks.cascade import Dropped
 from sweep.chunks.plan import PARAMETER_UNITS, error_words
 from sweep.dataset import files
 from sweep.evaluation.curves import joint_curves, motion_curves
@@ -23,18 +25,19 @@ from sweep.families.base import Angles, Array, Columns, Interval
 from sweep.families.names import is_error, without_error
 from sweep.jobs.progress import AT_MOST, Say, best_words, unsaid
 from sweep.jobs.signals import Deadline
-from sweep.optimise.local.kkt import CAVEAT, Result
+from sweep.optimise.local.kkt import CAVEAT, Result, noted, result_of
 from sweep.optimise.local.model import Model
-from sweep.optimise.manufacture.robust import best_yield_first, robust, yields
-from sweep.optimise.manufacture.tolerance import manufactured, sensitivities, tolerance_rows
-from sweep.optimise.multistart.kept import Kept, noted, result_of, survey_of
+from sweep.optimise.manufacture.margins import inequalities
+from sweep.optimise.manufacture.robust import best_yield_first, robust
+from sweep.optimise.manufacture.sample import Sampler, keeping, limits_of_made, manufactured, tolerance_rows
+from sweep.optimise.manufacture.tolerance import sensitivities
 from sweep.optimise.multistart.multistart import explore, listed, with_neighbours
-from sweep.optimise.multistart.survey import CUT, Survey
+from sweep.optimise.multistart.survey import CUT, Survey, survey_of
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.posing import problem_and_starts, problem_of, problem_of_dataset
 from sweep.optimise.starts.proportions import insensitive
-from sweep.study import Study
+from sweep.study import Limit, Study
 
 COLUMNS = Path(__file__).parents[1] / "columns.toml"
 
@@ -130,9 +133,9 @@ def optimise_study(
     Returns
     -------
     Path of ``_optimum.parquet``, whose metadata hold the survey of the starts, which
-    :func:`sweep.optimise.multistart.kept.read_survey` reads.  ``_curves.parquet``, ``_sensitivity.parquet`` and, for a
-    study with tolerances, ``_tolerance.parquet`` and ``_made.parquet`` are written beside it.  Each file is written as
-    a whole or not at all.
+    :func:`sweep.optimise.multistart.survey.read_survey` reads.  ``_curves.parquet``, ``_sensitivity.parquet`` and, for
+    a study with tolerances, ``_tolerance.parquet`` and ``_made.parquet`` are written beside it.  Each file is written
+    as a whole or not at all.
 
     Raises
     ------
@@ -145,10 +148,10 @@ def optimise_study(
     """
     dataset = Path(folder)
     results_folder = files.beside(dataset)
-    kept = Kept(results_folder / files.SEARCH if key else None, key)
+    kept = files.Kept(results_folder / files.SEARCH if key else None, key)
     deadline = Deadline(None if study.optimise is None else study.optimise.time_budget, stop)
     problem, results, survey = _nominal_search(study, dataset, deadline, jobs, say, kept)
-    nominal, settings, share = results[0], study.optimise, math.nan
+    nominal, settings = results[0], study.optimise
     sampled: Columns = {}
     if study.tolerance is not None and study.tolerance.robust is not None and settings and survey.ended not in CUT:
         unhurried = replace(settings, time_budget=None)  # one deadline for all following steps
@@ -162,26 +165,25 @@ def optimise_study(
             lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
         if robust_result is not None:
-            results, share, sampled = [robust_result.result, *results], robust_result.share, robust_result.outputs
+            results, sampled = [robust_result.result, *results], robust_result.outputs
     if deadline.pulled and survey.ended not in CUT:
         survey = replace(survey, ended="time", late=True)
-    tables = 3 if study.tolerance is None else 5
-    say("tables", 0, tables, "tables")
-    frame = _table(study, problem, results, nominal, share)
+    frame = _table(study, problem, results, nominal)
     about = {"search": json.dumps(asdict(survey)), "summary": "; ".join([survey.words, *survey.warnings])}
+    say("tables", 0, 3, "tables")
     write(results_folder / files.OPTIMUM, frame, study, about=about)
-    say("tables", 1, tables, "tables")
+    say("tables", 1, 3, "tables")
     write(results_folder / files.CURVES, _curves(study, frame), study)
-    say("tables", 2, tables, "tables")
+    say("tables", 2, 3, "tables")
     write(results_folder / files.SENSITIVITY, _by_role(study, frame, sensitivity), study)
-    say("tables", 3, tables, "tables")
-    if study.tolerance is None:
-        (results_folder / files.TOLERANCE).unlink(missing_ok=True)
-    else:
-        write(results_folder / files.TOLERANCE, _by_role(study, frame, _tolerance), study)
-        say("tables", 4, tables, "tables")
-    stopped = survey.ended == "interrupted" or (stop is not None and stop())
-    _write_made(results_folder / files.MADE, study, None if stopped else results[0].design, sampled)
+    for name in (files.TOLERANCE, files.MADE):
+        (results_folder / name).unlink(missing_ok=True)
+    stopped = survey.ended == "interrupted"
+    if study.tolerance is not None and settings is not None and not stopped:
+        with suppress(Dropped):
+            sampler = Sampler(problem, study.tolerance, settings.seed, stop or (lambda: False), jobs)
+            _write_made(study, results_folder, sampler, inequalities(problem), frame, sampled, say)
+            write(results_folder / files.OPTIMUM, frame, study, about=about)  # with the yields
     if stopped or (stop is not None and stop()):
         raise KeyboardInterrupt
     if not deadline.pulled:
@@ -190,7 +192,7 @@ def optimise_study(
 
 
 def _nominal_search(
-    study: Study, dataset: Path, deadline: Deadline, jobs: int, say: Say, kept: Kept
+    study: Study, dataset: Path, deadline: Deadline, jobs: int, say: Say, kept: files.Kept
 ) -> tuple[Problem, list[Result], Survey]:
     """Return the problem, the results of the nominal search, best first, and its survey, or those kept by `Kept`."""
     stored = kept.parts.get("drawing")
@@ -211,18 +213,18 @@ def _nominal_search(
         say("search in the catalogue", 0, 0, "steps")
         results = with_neighbours(problem, results, catalogue, settings, deadline, jobs)
     if study.tolerance is not None and survey.ended not in CUT:
-        results = best_yield_first(problem, results, study.tolerance, settings.seed)
+        tell = _counted(say, "equally good designs", 0)
+        with suppress(Dropped):
+            sampler = Sampler(problem, study.tolerance, settings.seed, deadline, jobs, tell)
+            results = best_yield_first(sampler, problem, results)
     if not deadline.pulled and survey.ended not in CUT:
         bounds = {"lower": problem.lower.tolist(), "upper": problem.upper.tolist()}
         kept.note("drawing", bounds | {"results": [noted(r) for r in results], "survey": asdict(survey)})
     return problem, results, survey
 
 
-def _table(study: Study, problem: Problem, results: list[Result], nominal: Result, share: float) -> dict[str, Any]:
-    """Return one row per start, best first, then the reference; a robust design precedes the ``nominal`` best.
-
-    ``share`` is the yield of the first row, nan if it has not been computed.
-    """
+def _table(study: Study, problem: Problem, results: list[Result], nominal: Result) -> dict[str, Any]:
+    """Return one row per start, best first, then the reference; a robust design precedes the ``nominal`` best."""
     designs = np.array([r.design for r in results])
     roles = ["nominal" if r is nominal else "start" for r in results[1:]]
     rows: dict[str, list[Any]] = {"role": ["optimum", *roles]}
@@ -235,14 +237,51 @@ def _table(study: Study, problem: Problem, results: list[Result], nominal: Resul
         for name, value in zip(rows, reference_row, strict=True):
             rows[name].append(value)
     if study.tolerance is not None:
-        rows["yield"] = [share] + [math.nan] * (len(designs) - 1)
-        without_yield = [k for k, role in enumerate(rows["role"]) if role != "start" and math.isnan(rows["yield"][k])]
-        assert study.optimise is not None
-        shares = yields(problem, designs[without_yield], study.tolerance, study.optimise.seed)
-        for k, yield_share in zip(without_yield, shares, strict=True):
-            rows["yield"][k] = yield_share
+        rows["yield"] = [math.nan] * len(designs)
     columns: dict[str, Any] = {name: designs[:, k] for k, name in enumerate(study.family.parameter_names)}
     return {"role": rows.pop("role"), "start": rows.pop("start")} | columns | outputs(study, designs) | rows
+
+
+def _counted(say: Say, label: str, total: int) -> Callable[[int], None]:
+    """Return a function that reports progress by the number of further mechanisms."""
+    done = 0
+
+    def tell(mechanisms: int) -> None:
+        nonlocal done
+        done += mechanisms
+        say(label, done, total, "mechanisms")
+
+    return tell
+
+
+def _write_made(
+    study: Study,
+    folder: Path,
+    sampler: Sampler,
+    limits: Sequence[Limit],
+    table: dict[str, Any],
+    known: Columns,
+    say: Say,
+) -> None:
+    """Sample what is made of the designs of a table, write tables about it, and add their yields to that table.
+
+    ``known`` are outputs of the optimum's mechanisms that have been computed already.
+    """
+    designs = np.array([table[name] for name in study.family.parameter_names], np.float64).T
+    shown = [k for k, role in enumerate(table["role"]) if role != "start"]
+    names = [limit.output for limit in (*limits, *limits_of_made(study)) if limit.output not in known]
+    total = sampler.planned(designs[0], len(shown) - (not names) if limits else 0, 1 + ("reference" in table["role"]))
+    sampler = replace(sampler, tell=_counted(say, "what is made", total))
+    columns = known | sampler.outputs(designs[0], names)
+    table["yield"][0] = float(keeping(limits, columns).mean())
+    for k in shown[1:]:
+        table["yield"][k] = sampler.share(designs[k], limits)
+    sample = manufactured(study, designs[0], sampler, columns)
+    rows = _by_role(study, table, lambda _, design: tolerance_rows(sampler, design, study.want, study.output_limits))
+    write(folder / files.TOLERANCE, rows, study)
+    if sample is not None:
+        columns = {sample.output: sample.values, "kept": sample.kept}
+        write(folder / files.MADE, columns, study, about={"costs": json.dumps(sample.costs)})
 
 
 def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
@@ -289,25 +328,6 @@ def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Arra
     return rows
 
 
-def _write_made(path: Path, study: Study, design: Array | None, known: Columns) -> None:
-    """Write the sample of manufactured mechanisms of the optimum (P,), slow for many limits; None removes the table."""
-    sample = None if design is None else manufactured(study, design, known)
-    if sample is None:
-        path.unlink(missing_ok=True)
-    else:
-        about = {"costs": json.dumps(sample.costs)}
-        write(path, {sample.output: sample.values, "kept": sample.kept}, study, about=about)
-
-
 def sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:
     """Return the derivatives of the wanted outputs by the dimensions of a design (P,)."""
     return sensitivities(study.family, design, study.want, study.window)
-
-
-def _tolerance(study: Study, design: Array) -> dict[str, list[Any]]:
-    if study.tolerance is None or study.optimise is None:
-        return {}
-    return tolerance_rows(
-        study.family, design, study.want, study.output_limits, study.tolerance, study.optimise.seed, study.accuracy,
-        study.window,
-    )  # fmt: skip

@@ -5,23 +5,22 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from sweep.dataset import files
 from sweep.evaluation.cyclogram import event_angles
-from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array
 from sweep.families.names import is_flag, without_minus
-from sweep.optimise.manufacture.tolerance import (
+from sweep.optimise.manufacture.sample import (
     TELLING_GAIN,
     Cost,
     Manufactured,
+    Sampler,
     limits_of_made,
     manufactured,
-    sampled_designs,
 )
 from sweep.quantities import resolve
 from sweep.quantities.limits import compared, meets
@@ -71,17 +70,12 @@ class YieldSummary(NamedTuple):
     costs: tuple[Cost, ...]
 
 
-def toleranced(data: Dataset, row: Mapping[str, Any] | None, samples: int = 0) -> tuple[Array, Array] | None:
-    """Return a design (P,) and its toleranced mechanisms (n, P), n from the tolerances unless ``samples`` is given.
-
-    None without tolerances, an optimisation, or a design.
-    """
+def sampler(data: Dataset, samples: int | None = None) -> Sampler | None:
+    """Return what samples a dataset's mechanisms, as many as its tolerances say; None without them or a search."""
     study = data.study
-    if study.tolerance is None or study.optimise is None or row is None:
+    if study.tolerance is None or study.optimise is None:
         return None
-    design = _design(data, row)
-    samples = samples or study.tolerance.samples
-    return design, sampled_designs(study.family, design, study.tolerance, study.optimise.seed, samples)
+    return Sampler(study, replace(study.tolerance, samples=samples or study.tolerance.samples), study.optimise.seed)
 
 
 def made(data: Dataset) -> YieldSummary | None:
@@ -102,10 +96,14 @@ def _manufactured(data: Dataset) -> Manufactured | None:
         return Manufactured(
             rows.columns[0], rows.iloc[:, 0].to_numpy(), rows["kept"].to_numpy(), tuple(Cost(*x) for x in costs)
         )
-    return None if data.optimum is None else manufactured(data.study, _design(data, data.optimum))
+    source = sampler(data)
+    if source is None or data.optimum is None:
+        return None
+    return manufactured(data.study, design_of(data, data.optimum), source)
 
 
-def _design(data: Dataset, row: Mapping[str, Any]) -> Array:
+def design_of(data: Dataset, row: Mapping[str, Any]) -> Array:
+    """Return the design (P,) of a row."""
     return np.array([float(row[name]) for name in data.study.family.parameter_names])
 
 
@@ -126,11 +124,11 @@ def made_sentence(result: YieldSummary | None, tolerance: str) -> str:
 
 def histogram(data: Dataset, output: str) -> Histogram | None:
     """Return the histogram of one output over manufactured mechanisms; None without tolerances or an optimum."""
-    study, sample = data.study, toleranced(data, data.optimum)
-    if sample is None:
+    study, source = data.study, sampler(data)
+    if source is None or data.optimum is None:
         return None
     resolve.output(study.family, output)  # raises for an unknown name
-    values = design_outputs(study.family, sample[1], [output], study.accuracy, study.window)[output]
+    values = source.outputs(design_of(data, data.optimum), [output])[output]
     limits = [x for x in study.output_limits if x.output == output]
     # Of two limits the last one is the tolerance band around a prescribed output.
     return _histogram(data, limits[-1] if limits else Limit(output, None, None), values)

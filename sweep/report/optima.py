@@ -17,11 +17,10 @@ from kernels import status as codes
 from sweep.exchange.scene import extent
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE
-from sweep.optimise.manufacture.tolerance import within_limits
 from sweep.quantities.dimensions import sizes
 from sweep.quantities.limits import compared
 from sweep.report.dataset import Dataset, Row, records
-from sweep.report.made import toleranced
+from sweep.report.made import design_of, sampler
 from sweep.report.quantities import change, number, quantity
 from sweep.report.sketch import drawn_parts, sketch
 from sweep.report.tables import parameter_rows
@@ -231,10 +230,10 @@ def _made(data: Dataset, row: dict[str, Any]) -> str:
     if not limits:
         return ""
     if not math.isfinite(share):
-        sample = toleranced(data, row, SAMPLES)
-        if sample is None:
+        source = sampler(data, SAMPLES)
+        if source is None:
             return ""
-        share = float(within_limits(study, limits, sample[1])[1].mean())
+        share = source.share(design_of(data, row), limits)
     return f"{number(100.0 * share, 3)}\u00a0% of what is made keeps all limits"
 
 

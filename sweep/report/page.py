@@ -14,7 +14,7 @@ from sweep.dataset.files import OF_OPTIMUM, PARETO, beside, located, replacing, 
 from sweep.errors import InputError
 from sweep.evaluation.statuses import meaning
 from sweep.jobs.progress import Say, unsaid
-from sweep.optimise.manufacture.tolerance import COST_SAMPLE, TELLING_GAIN
+from sweep.optimise.manufacture.sample import COST_SAMPLE, TELLING_GAIN
 from sweep.pages import rendered
 from sweep.report import answer, tables
 from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, read_dataset, read_rows, row_of

@@ -18,7 +18,7 @@ from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, Thr
 from sweep.numerics.records import Mask
 from sweep.report.dataset import Dataset
 from sweep.report.figures import LIMIT, WIDTH, new_figure
-from sweep.report.made import toleranced
+from sweep.report.made import design_of, sampler
 from sweep.report.quantities import number
 
 if TYPE_CHECKING:
@@ -69,10 +69,11 @@ def sewn(data: Dataset) -> Sewn | None:
     """Sample mechanisms of the optimum and test sewing at every speed; None without tolerances or a sewing relation."""
     study = data.study
     sewing = next((one for one in getattr(study.family, "relations", ()) if isinstance(one, Sewing)), None)
-    drawn = toleranced(data, data.optimum) if sewing else None
-    if sewing is None or drawn is None or not isinstance(study.family, Machine):
+    source = sampler(data)
+    if sewing is None or source is None or data.optimum is None or not isinstance(study.family, Machine):
         return None
-    design, designs = drawn
+    design = design_of(data, data.optimum)
+    designs = source.designs(design)
     stated = np.array(sewing.speeds)
     speeds = np.union1d(stated, np.linspace(stated[0], stated[-1], CURVE))
     ends = sewing.ends.values()

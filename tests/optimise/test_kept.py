@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import sweep.optimise.study
-from sweep.dataset.files import OF_OPTIMUM
+from sweep.dataset.files import MADE, OF_OPTIMUM, OPTIMUM, TOLERANCE, Kept
 from sweep.engine.run import run
 from sweep.optimise import optimise_study
-from sweep.optimise.local.kkt import Result
-from sweep.optimise.multistart.kept import Kept, noted, result_of
+from sweep.optimise.local.kkt import Result, noted, result_of
 from sweep.study import load_study
 from tests.optimise.test_robust import ROBUST
+
+PLAIN = ROBUST.replace('robust = "95 %"\n', "")
 
 
 def test_search_that_was_stopped_while_designs_were_made_robust_goes_on_there(
@@ -43,6 +46,40 @@ def test_search_that_was_stopped_while_designs_were_made_robust_goes_on_there(
     monkeypatch.setattr(sweep.optimise.study, "explore", refused)
     optimise_study(study, out, key="k")
     assert not file.exists()
+    assert {name: (tmp_path / name).read_bytes() for name in OF_OPTIMUM} == whole
+
+
+def test_run_that_was_stopped_at_what_is_made_keeps_its_optimum_and_repeats_the_sample_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweep.optimise.manufacture.sample.batch_size", lambda _: 4096)
+    (tmp_path / "study.toml").write_text(PLAIN)
+    study, told = load_study(tmp_path), list[tuple[int, int]]()
+
+    def say(label: str, done: int, total: int, unit: str) -> None:
+        if label == "what is made":
+            told.append((done, total))
+
+    out = run(study, tmp_path / "designs", jobs=1)
+    whole = {name: (tmp_path / name).read_bytes() for name in OF_OPTIMUM}
+    with pytest.raises(KeyboardInterrupt):
+        optimise_study(study, out, lambda: len(told) >= 3, say=say, key="k")
+    # yields of optimum and reference, their distributions, and the costs of seven dimensions
+    total = 2 * 65536 + 2 * 2048 + 7 * 512
+    assert told == [(4096, total), (8192, total), (12288, total)]
+    table = pd.read_parquet(tmp_path / OPTIMUM)
+    known = pd.read_parquet(io.BytesIO(whole[OPTIMUM]))
+    assert table["yield"].isna().all() and table.drop(columns="yield").equals(known.drop(columns="yield"))
+    # those of an earlier optimum would be taken for this one's
+    assert not (tmp_path / MADE).exists() and not (tmp_path / TOLERANCE).exists()
+
+    def refused(*_: object) -> None:
+        raise AssertionError("the drawing was searched again")
+
+    monkeypatch.setattr(sweep.optimise.study, "explore", refused)
+    told.clear()
+    optimise_study(study, out, say=say, key="k")
+    assert told[-1] == (total, total)
     assert {name: (tmp_path / name).read_bytes() for name in OF_OPTIMUM} == whole
 
 

@@ -14,7 +14,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy
-from sweep.optimise.manufacture.tolerance import sampled_designs
+from sweep.optimise.manufacture.sample import sampled_designs
 from sweep.quantities.limits import Limit, meets
 from sweep.study.study import Tolerance
 from tests.families.machines.test_stitch_reference import ROWS, machine_of

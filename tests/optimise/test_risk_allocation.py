@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sweep.families.base import Angles, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.optimise import Problem, minimise
 from sweep.optimise.manufacture import robust as robust_search
 from sweep.optimise.manufacture.margins import Scatter, excesses, prices, risk_allocation, with_margins
 from sweep.optimise.manufacture.robust import robust
+from sweep.optimise.manufacture.sample import Sampler
 from sweep.study import Limit, OptimiseSettings, Tolerance
 
 NORMAL = NormalDist()
@@ -189,7 +190,7 @@ def test_one_number_for_all_limits_would_cost_more(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_design_that_a_correction_leaves_as_it_is_is_not_sampled_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    approached, sample, sampled, standing = robust_search._margin_rounds, robust_search.sampled_designs, [], []
+    approached, sample, sampled, standing = robust_search._margin_rounds, Sampler.outputs, [], []
 
     def stands_still(*given: Any) -> Any:
         if not standing:
@@ -197,12 +198,12 @@ def test_a_design_that_a_correction_leaves_as_it_is_is_not_sampled_again(monkeyp
             standing.append((replace(result, ended="looks"), radius, step))
         return standing[0]
 
-    def noted(family: Family, design: np.ndarray, *given: Any) -> np.ndarray:
+    def noted(sampler: Sampler, design: np.ndarray, *given: Any) -> Columns:
         sampled.append(tuple(design))
-        return sample(family, design, *given)
+        return sample(sampler, design, *given)
 
     monkeypatch.setattr(robust_search, "_margin_rounds", stands_still)
-    monkeypatch.setattr(robust_search, "sampled_designs", noted)
+    monkeypatch.setattr(Sampler, "outputs", noted)
     settings = OptimiseSettings(starts=1, seed=5)
     drawing = minimise(PROBLEM, PROBLEM.rows(np.array([[0.7, 0.8]])), settings)
     assert robust(PROBLEM, drawing, TOLERANCE, settings) is not None

@@ -19,7 +19,7 @@ from sweep.jobs.signals import Deadline
 from sweep.optimise import Problem, explore, read_survey
 from sweep.optimise.local.model import Model
 from sweep.optimise.manufacture.margins import Scatter, with_margins
-from sweep.optimise.manufacture.tolerance import manufactured
+from sweep.optimise.manufacture.sample import Sampler, manufactured
 from sweep.optimise.problem.program import Program
 from sweep.study import Limit, OptimiseSettings, Tolerance, load_study, study_from_data
 from tests.optimise.test_study import STUDY
@@ -108,7 +108,8 @@ def test_table_of_what_is_made_is_that_of_the_design_alone(robust_folder: Path) 
     """It takes what the search has computed of the same mechanisms; bit for bit it is what they give by themselves."""
     best = pd.read_parquet(robust_folder / "_optimum.parquet").set_index("role").loc["optimum"]
     study = load_study(robust_folder)
-    alone = manufactured(study, best[list(study.family.parameter_names)].to_numpy(np.float64))
+    sampler = Sampler(study, study.tolerance, study.optimise.seed)
+    alone = manufactured(study, best[list(study.family.parameter_names)].to_numpy(np.float64), sampler)
     table = pd.read_parquet(robust_folder / "_made.parquet")
     assert alone is not None and 0.95 <= table["kept"].mean() < 1.0
     np.testing.assert_array_equal(table[alone.output], alone.values)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from scipy import stats
 
 import sweep
 from kernels import status as st
+from sweep.chunks.cascade import Dropped
 from sweep.dataset.files import MADE, beside
 from sweep.effects import extended
 from sweep.engine.run import run
@@ -22,8 +24,9 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise import Problem
-from sweep.optimise.manufacture.robust import yields
-from sweep.optimise.manufacture.tolerance import sampled_designs, sensitivities, tolerance_rows
+from sweep.optimise.manufacture.margins import inequalities
+from sweep.optimise.manufacture.sample import Sampler, sampled_designs, tolerance_rows
+from sweep.optimise.manufacture.tolerance import sensitivities
 from sweep.report.dataset import read_dataset
 from sweep.report.made import made
 from sweep.study import Limit, Tolerance, load_study
@@ -57,6 +60,14 @@ starts = 2
 lengths = "0.05 mm"
 """
 OUTPUTS = ("max_abs_d2psi", "max_pressure_angle", "swing", "phi0", "stroke_ratio", "margin", "min_dpsi")
+
+
+def sampler_of(tolerance: Tolerance, **more: Any) -> Sampler:
+    names = RSSR.parameter_names[:7]
+    problem = Problem(
+        RSSR, names, DESIGN[:7] - 0.5, DESIGN[:7] + 0.5, {}, "max_abs_d2psi", accuracy=Accuracy(target=1e-9)
+    )
+    return Sampler(problem, tolerance, 3, **more)
 
 
 def test_sensitivities_are_the_slopes_of_design_outputs() -> None:
@@ -159,9 +170,7 @@ def test_deviating_designs_have_the_tolerance_as_three_standard_deviations() -> 
 def test_small_tolerances_give_the_band_of_the_sensitivities() -> None:
     tolerance = Tolerance(0.003, 0.0001)
     names = ("max_abs_d2psi", "max_pressure_angle")
-    rows = pd.DataFrame(tolerance_rows(RSSR, DESIGN, names, (), tolerance, 3, Accuracy(target=1e-9))).set_index(
-        "output"
-    )
+    rows = pd.DataFrame(tolerance_rows(sampler_of(tolerance), DESIGN, names, ())).set_index("output")
     table = pd.DataFrame(sensitivities(RSSR, DESIGN, names))
     for name in names:
         slopes = table[table.output == name].growing.to_numpy()
@@ -176,9 +185,7 @@ def test_small_tolerances_give_the_band_of_the_sensitivities() -> None:
 def test_share_within_a_limit_at_the_nominal_value_is_half() -> None:
     nominal = design_outputs(RSSR, DESIGN[None, :], ["max_pressure_angle"], Accuracy(target=1e-9))["max_pressure_angle"]
     limits = (Limit("max_pressure_angle", None, float(nominal[0])), Limit("swing", 0.0, None))
-    rows = tolerance_rows(
-        RSSR, DESIGN, ("max_pressure_angle", "swing"), limits, Tolerance(0.003), 3, Accuracy(target=1e-9)
-    )
+    rows = tolerance_rows(sampler_of(Tolerance(0.003)), DESIGN, ("max_pressure_angle", "swing"), limits)
     assert rows["output"] == ["max_pressure_angle", "swing", "all limits"]
     assert rows["within"][0] == pytest.approx(0.5, abs=0.03)
     assert rows["within"][1] == 1.0 and rows["within"][2] == rows["within"][0]
@@ -189,15 +196,51 @@ def test_equations_are_no_limits_of_what_is_made() -> None:
     at = {k: float(x[0]) for k, x in design_outputs(RSSR, DESIGN[None, :], names, Accuracy(target=1e-9)).items()}
     held = Limit("swing", abs(at["swing"]), abs(at["swing"]))
     limits = (Limit("max_pressure_angle", None, at["max_pressure_angle"]), held)
-    rows = tolerance_rows(RSSR, DESIGN, names, limits, tolerance, 3, Accuracy(target=1e-9))
+    rows = tolerance_rows(sampler_of(tolerance), DESIGN, names, limits)
     # Nothing that is made has a prescribed swing to the last digit: it would be 0 % of everything.
     assert math.isnan(rows["within"][1])
     assert rows["within"][2] == rows["within"][0] == pytest.approx(0.5, abs=0.03)
     lower, upper = DESIGN[:7] - 0.5, DESIGN[:7] + 0.5
     problem = Problem(RSSR, RSSR.parameter_names[:7], lower, upper, {}, "max_abs_d2psi", limits)
-    assert yields(problem, DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.03)
+    sampler = Sampler(problem, tolerance, 3)
+    assert sampler.share(DESIGN, inequalities(problem)) == pytest.approx(0.5, abs=0.03)
     band = replace(held, minimum=0.5 * abs(at["swing"]), maximum=abs(at["swing"]))
-    assert yields(replace(problem, limits=(band,)), DESIGN[None, :], tolerance, 3)[0] == pytest.approx(0.5, abs=0.05)
+    assert sampler.share(DESIGN, (band,)) == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_is_made_is_computed_in_blocks_with_the_bits_of_one_call(
+    jobs: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sweep.optimise.manufacture.sample.batch_size", lambda _: 100)
+    monkeypatch.setattr("sweep.optimise.manufacture.sample.SPREAD_SECONDS", -1.0)
+    tolerance, told, names = Tolerance(0.03, 0.001, samples=512), list[int](), ("swing", "max_pressure_angle")
+    sampler = sampler_of(tolerance, jobs=jobs, tell=told.append)
+    found = sampler.outputs(DESIGN, names)
+    assert sorted(told) == [12, 100, 100, 100, 100, 100]
+    designs = sampled_designs(RSSR, DESIGN, tolerance, 3, 512)
+    whole = design_outputs(RSSR, designs, names, Accuracy(target=1e-9))
+    for name in names:
+        np.testing.assert_array_equal(found[name], whole[name])
+    limits = (
+        Limit("max_pressure_angle", None, float(np.median(found["max_pressure_angle"]))),
+        Limit("swing", 0.1, None),
+    )
+    assert sampler.share(DESIGN, limits) == 0.5
+    # the first of them, with one dimension as it is drawn
+    designs[:, 2] = DESIGN[2]
+    exact = sampler.outputs(DESIGN, names, count=150, exact=2)
+    whole = design_outputs(RSSR, designs[:150], names, Accuracy(target=1e-9))
+    np.testing.assert_array_equal(exact["swing"], whole["swing"])
+
+
+def test_what_is_made_stops_behind_the_block_that_it_is_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sweep.optimise.manufacture.sample.batch_size", lambda _: 64)
+    told = list[int]()
+    sampler = sampler_of(Tolerance(0.03, samples=1024), should_stop=lambda: len(told) >= 3, tell=told.append)
+    with pytest.raises(Dropped):
+        sampler.outputs(DESIGN, ["swing"])
+    assert told == [64, 64, 64]
 
 
 def test_study_writes_its_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

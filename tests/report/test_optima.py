@@ -17,7 +17,7 @@ import sweep
 from kernels import status as codes
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.names import negative
-from sweep.optimise.manufacture.tolerance import sampled_designs
+from sweep.optimise.manufacture.sample import sampled_designs
 from sweep.pages import rendered
 from sweep.plot.datasets import draw_histogram
 from sweep.report.answer import not_achieved

@@ -168,21 +168,24 @@ def test_every_part_of_a_run_is_told(tmp_path, quick, monkeypatch, capsys) -> No
         write_report(folder, say=phases.say)
     lines = capsys.readouterr().err.splitlines()
     labels = list(dict.fromkeys(line.split(":")[0] for line in lines))
-    parts = ("compiling", "planning", "words", "search", "tables", "front")
-    numbered = [f"{k}/6 {label}" for k, label in enumerate(parts, 1)]
-    assert labels == [*numbered[:2], "reading what is there", *numbered[2:], "report"]
+    parts = ("compiling", "planning", "words", "search", "tables", "what is made", "front")
+    numbered = [f"{k}/7 {label}" for k, label in enumerate(parts, 1)]
+    assert labels == [
+        *numbered[:2], "reading what is there", *numbered[2:4], "equally good designs", *numbered[4:], "report",
+    ]  # fmt: skip
     for label, unit in (
-        ("1/6 compiling", "steps"),
-        ("5/6 tables", "tables"),
-        ("6/6 front", "steps"),
+        ("1/7 compiling", "steps"),
+        ("5/7 tables", "tables"),
+        ("6/7 what is made", "mechanisms"),
+        ("7/7 front", "steps"),
         ("report", "steps"),
     ):
         counted = [line for line in lines if re.match(rf"{label}: \d+ of \d+ {unit} ", line)]
         assert any(line.endswith(" left") for line in counted), (label, counted)
-    told = r"1/6 compiling: \d+ of 4 steps \(\d+%\), \d+ functions? compiled for "
+    told = r"1/7 compiling: \d+ of 4 steps \(\d+%\), \d+ functions? compiled for "
     assert any(re.match(told, line) for line in lines)
     # Of a maximum no share and no remaining time is known, but the best value so far.
-    searched = [line for line in lines if line.startswith("4/6 search: 3 of 3 starts at most, the best ")]
+    searched = [line for line in lines if line.startswith("4/7 search: 3 of 3 starts at most, the best ")]
     assert searched and not any("%" in line or "left" in line for line in searched)
 
 

@@ -14,7 +14,8 @@ import pandas as pd
 import pytest
 
 from sweep.evaluation.summaries import design_outputs
-from sweep.optimise.manufacture.robust import yields
+from sweep.optimise.manufacture.margins import inequalities
+from sweep.optimise.manufacture.sample import Sampler
 from sweep.optimise.starts.posing import problem_of
 from sweep.study import load_study
 from tests.reference.made import normal, outputs
@@ -82,7 +83,7 @@ def test_yield_is_confirmed_by_mechanisms_that_share_no_code(count):
     limits = limits_that_some_miss(found)
     matrix = np.array([[design[name] for name in STUDY.family.parameter_names]])
     problem = replace(problem_of(STUDY, matrix), limits=tuple(limits))
-    (ours,) = yields(problem, matrix, STUDY.tolerance, 5)
+    ours = Sampler(problem, STUDY.tolerance, 5).share(matrix[0], inequalities(problem))
     theirs = kept(found, limits)
     assert 0.3 < theirs < 0.9 and ours == pytest.approx(theirs, abs=tolerated(count))
 
@@ -93,7 +94,8 @@ def test_yield_within_the_limits_of_the_study_is_confirmed_by_100000_mechanisms(
     design = DESIGN
     matrix = np.array([[design[name] for name in STUDY.family.parameter_names]])
     limits = [limit for limit in STUDY.output_limits if limit.minimum is None or limit.minimum != limit.maximum]
-    (ours,) = yields(problem_of(STUDY, matrix), matrix, STUDY.tolerance, 5)
+    problem = problem_of(STUDY, matrix)
+    ours = Sampler(problem, STUDY.tolerance, 5).share(matrix[0], inequalities(problem))
     theirs = kept(outputs(made(design, 100_000)), limits)
     assert ours == pytest.approx(theirs, abs=tolerated(100_000))
 

@@ -15,6 +15,7 @@ from sweep.costs import nanoseconds
 from sweep.engine.estimate import check_budget, duration, estimate, other_accuracies, searches
 from sweep.engine.run import run
 from sweep.errors import BudgetError
+from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.study import Budget, Study, load_study, study_from_data
 from tests.optimise.test_robust import ROBUST
@@ -173,25 +174,51 @@ def test_ends_of_a_window_have_the_price_of_events(tmp_path: Path, wanted: str, 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_price_of_what_follows_counts_every_search(monkeypatch, jobs):
     """A look takes 10 ms: 27 s of a population and 36 s of a robust end were measured at 9."""
-    monkeypatch.setattr("sweep.optimise.local.start.search", lambda *_: SimpleNamespace(looks=10, ended="looks"))
+    monkeypatch.setattr("sweep.engine.estimate.search", lambda *_: SimpleNamespace(looks=10, ended="looks"))
     ticks = itertools.count(step=0.1)
     monkeypatch.setattr("sweep.engine.estimate.time.process_time", lambda: next(ticks))
+    monkeypatch.setattr("sweep.engine.estimate._made_seconds", lambda *_: (7.0, 0.5))
     study = load_study(Path(__file__).parents[2] / "studies" / "needle208")
     designs, _ = design_matrix(study.family, study.reference)
     found = {name: (typical, most) for name, typical, most in searches(study, jobs, SimpleNamespace(kept=designs))}
-    assert list(found) == ["search", "tolerances", "tables and report"]
+    assert list(found) == ["search", "tolerances", "what is made", "tables and report"]
+    assert found["what is made"] == (7.0 / jobs, 7.0)
     # A population and the searches from two of its ends; those from two designs of the sweep where they are needed.
     assert found["search"] == pytest.approx((3 * (30.0 + 6.0) / jobs, (40 * (30.0 + 80.0) + 80.0) / jobs))
     whole = (4 * 16.0 + 3 * 40.0 + 3 * 30.0) / jobs
-    assert found["tolerances"] == pytest.approx((whole, 2.0 * whole))
+    # Three samples of what is made of each of three ends, and eleven at most.
+    few, many = 3 * 3 * 0.5 / jobs, 11 * 3 * 0.5 / jobs
+    assert found["tolerances"] == pytest.approx((whole + few, 2.0 * whole + many))
+
+
+def test_price_of_what_is_made_counts_every_mechanism(monkeypatch):
+    """Nine minutes of mechanisms of a back-rest were said to be five seconds of tables and report."""
+    clock = [0.0]
+
+    def taking_a_millisecond(family, designs, *given):
+        clock[0] += 1e-3 * len(designs)
+        return design_outputs(family, designs, *given)
+
+    monkeypatch.setattr("sweep.optimise.manufacture.sample.design_outputs", taking_a_millisecond)
+    monkeypatch.setattr("sweep.optimise.manufacture.sample.batch_size", lambda _: 100)
+    monkeypatch.setattr("sweep.engine.estimate.time.process_time", lambda: clock[0])
+    monkeypatch.setattr("sweep.engine.estimate.search", lambda *_: SimpleNamespace(looks=25, ended="converged"))
+    monkeypatch.setattr("sweep.engine.estimate.sample_seconds", lambda *_: 0.0)
+    study = study_from_data(tomllib.loads(ROBUST), "study.toml")
+    design = design_matrix(study.family, study.reference)[0]
+    found = {name: most for name, _, most in searches(study, 1, SimpleNamespace(kept=design))}
+    # Yields of optimum, drawing and reference, outputs of the first and the last, costs of seven dimensions.
+    assert found["what is made"] == pytest.approx(1e-3 * (3 * 65536 + 2 * 2048 + 7 * 512))
+    assert clock[0] == pytest.approx(0.6, abs=0.11)  # no more than has to be tried
 
 
 def test_price_of_searches_that_converge_is_that_of_the_looks_they_take(monkeypatch):
     """The tolerances of a crank-rocker of seven dimensions were said to take 66 s, and took 1.6."""
-    monkeypatch.setattr("sweep.optimise.local.start.search", lambda *_: SimpleNamespace(looks=25, ended="converged"))
+    monkeypatch.setattr("sweep.engine.estimate.search", lambda *_: SimpleNamespace(looks=25, ended="converged"))
     ticks = itertools.count(step=0.025)
     monkeypatch.setattr("sweep.engine.estimate.time.process_time", lambda: next(ticks))
-    monkeypatch.setattr("sweep.optimise.starts.dataset.sample_seconds", lambda *_: 0.0)
+    monkeypatch.setattr("sweep.engine.estimate.sample_seconds", lambda *_: 0.0)
+    monkeypatch.setattr("sweep.engine.estimate._made_seconds", lambda *_: (0.0, 0.0))
     study = study_from_data(tomllib.loads(ROBUST), "study.toml")
     design = design_matrix(study.family, study.reference)[0]
     found = {name: (typical, most) for name, typical, most in searches(study, 1, SimpleNamespace(kept=design))}

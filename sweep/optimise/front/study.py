@@ -18,7 +18,7 @@ from sweep.evaluation.summaries import output
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, unsaid
 from sweep.optimise.front.pareto import FrontSearch, advance
-from sweep.optimise.multistart.kept import noted, result_of
+from sweep.optimise.local.kkt import noted, result_of
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import best_rows
 from sweep.optimise.starts.populations import diverse

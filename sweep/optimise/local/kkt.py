@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -129,6 +130,16 @@ class Result:
         return "; ".join(
             f"{name} {NO_VALUE if math.isnan(short) else f'by {short:.6g}'}" for name, short in self.relaxation.items()
         )
+
+
+def noted(result: Result) -> dict[str, Any]:
+    """Return a result as a dict that JSON can store."""
+    return asdict(result) | {"design": result.design.tolist()}
+
+
+def result_of(part: dict[str, Any]) -> Result:
+    """Return the result stored as a dict."""
+    return Result(**part | {"design": np.array(part["design"], np.float64), "active": tuple(part["active"])})
 
 
 def in_words(labels: tuple[Label, ...], duals: Multipliers, variables: tuple[str, ...]) -> dict[str, float]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sweep.families.base import Array
 from sweep.optimise.local.model import Model
@@ -173,11 +174,11 @@ def excesses(problem: Problem, outputs: Mapping[str, Array], units: Mapping[str,
     units : standard deviation of every limit
     """
     keys, out = margin_keys(problem), dict[str, Array]()
-    failing = np.zeros(len(outputs[problem.objective]), np.bool_)
+    failing: NDArray[np.bool_] = np.zeros(1, np.bool_)
     for limit in inequalities(problem):
         key, values = keys.get(limit.output), outputs[limit.output]
         if key is None:
-            failing |= ~meets(limit, values)
+            failing = failing | ~meets(limit, values)
             continue
         low, high = limit.ends
         violation, unit = np.maximum(low - values, values - high), units[key].spread

@@ -9,11 +9,14 @@ from statistics import NormalDist
 
 import numpy as np
 
-from sweep.evaluation.summaries import design_outputs, routes
+from sweep.chunks.cascade import Dropped
+from sweep.dataset.files import Kept
+from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Array, Columns
+from sweep.families.names import judged_by
 from sweep.jobs.executors import Task
 from sweep.jobs.progress import best_words
-from sweep.optimise.local.kkt import AGREE, Result
+from sweep.optimise.local.kkt import AGREE, Result, noted, result_of
 from sweep.optimise.local.model import Model
 from sweep.optimise.local.start import search
 from sweep.optimise.manufacture.margins import (
@@ -26,13 +29,12 @@ from sweep.optimise.manufacture.margins import (
     risk_allocation,
     with_margins,
 )
-from sweep.optimise.manufacture.tolerance import sampled_designs, within_limits
-from sweep.optimise.multistart.kept import Kept, noted, result_of
+from sweep.optimise.manufacture.sample import Sampler, keeping
 from sweep.optimise.multistart.parallel import spread_over
 from sweep.optimise.multistart.survey import CUT
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
-from sweep.quantities.limits import compared, meets
+from sweep.quantities.limits import compared
 from sweep.study import OptimiseSettings, Tolerance
 
 SAME = 1e-8  # relative difference of two optima that count as equally good
@@ -57,7 +59,8 @@ SHARE_EXCESS = 0.0005  # allowed excess of the sampled share over the wanted one
 class Robust:
     """A robust result, the sampled share of mechanisms that keep all limits, and whether time ran out.
 
-    ``outputs`` are those of the sampled mechanisms; none where the share was computed otherwise or by a stopped run.
+    The share is nan if time ran out before.  ``outputs`` are those of the sampled mechanisms, none if an earlier run
+    has computed them.
     """
 
     result: Result
@@ -148,11 +151,9 @@ def robust(
         return None
     total = len(designs) + len(ends)
     calibrate = _Calibrate(problem, tuple(ends), tolerance, level, settings.seed, settings.looks)
-    runs = run_tasks("calibrated", calibrate, len(ends), len(designs)) or [
-        Robust(r, _yield_share(problem, r.design, tolerance, settings.seed), True) for r in ends[:1]
-    ]
+    runs = run_tasks("calibrated", calibrate, len(ends), len(designs)) or [Robust(ends[0], math.nan, True)]
     sufficient = [x for x in runs if x.share >= (tolerance.robust or 0.0)]
-    best = min(sufficient, key=lambda x: x.result.objective) if sufficient else max(runs, key=lambda x: x.share)
+    best = min(sufficient, key=lambda x: x.result.objective, default=max(runs, key=lambda x: np.nan_to_num(x.share)))
     value = best.result.objective
     equal = [end for end, x in zip(ends, runs, strict=False) if abs(x.result.objective - value) <= AGREE * abs(value)]
     agree = sum(any(_same_design(problem, r, end) for end in equal) for r in reached)
@@ -210,35 +211,40 @@ class _Calibrate:
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Robust:
         initial, wanted = self.results[number], self.tolerance.robust or 0.0
         scatter, excess = Scatter(self.problem, self.tolerance), max(SHARE_EXCESS, 1.0 / self.tolerance.samples)
+        sampler = Sampler(self.problem, self.tolerance, self.seed, should_stop)
         levels: Levels = dict.fromkeys(margin_keys(self.problem).values(), self.level)
-        outputs, share = self._sampled_outputs(initial.design)
-        best = self._robust(initial, share, outputs)
+        best = Robust(initial, math.nan)
         design, result, radius, step, reach, spent = initial.design, initial, RADIUS, math.inf, REACH, 0
-        for correction in range(CORRECTIONS):
-            if should_stop():
-                return replace(best, cut=True)
-            if correction or initial.ended != "converged":  # otherwise these margins have led to this design already
-                # Rounds that do not settle must not delay the other searches: all corrections share the evaluations of
-                # one search.
-                budget = max(min(FIRST_BUDGET, self.budget), (self.budget - spent) // ROUNDS)
-                result, radius, step = _margin_rounds(
-                    scatter, initial.start, design, levels, should_stop, budget, radius
-                )
-                spent += result.looks
-                if not np.array_equal(result.design, design):
-                    design = result.design
-                    outputs, share = self._sampled_outputs(design)
-            value = best.result.objective  # negative if an output is maximised
-            gain = (value - result.objective) / (abs(value) or 1.0) if best.share >= wanted else math.inf
-            better = share >= wanted and gain > 0.0
-            if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
-                best = self._robust(result, share, outputs)
-            if spent >= self.budget or (correction and share >= wanted and not better and result.ended == "looks"):
-                break  # prices of an unsettled search would mislead the correction
-            levels, saving = self._corrected(scatter, design, levels, outputs, reach)
-            if wanted <= share <= wanted + excess and step < STEP_SETTLED and min(saving, gain) < SAVING_SETTLED:
-                break
-            reach *= REACH_FACTOR
+        try:
+            outputs, share = self._sampled_outputs(sampler, design)
+            best = self._robust(initial, share, outputs)
+            for correction in range(CORRECTIONS):
+                if should_stop():
+                    raise Dropped
+                if correction or initial.ended != "converged":  # otherwise these margins have led to this design
+                    # Rounds that do not settle must not delay the other searches: all corrections share the evaluations
+                    # of one search.
+                    budget = max(min(FIRST_BUDGET, self.budget), (self.budget - spent) // ROUNDS)
+                    result, radius, step = _margin_rounds(
+                        scatter, initial.start, design, levels, should_stop, budget, radius
+                    )
+                    spent += result.looks
+                    if not np.array_equal(result.design, design):
+                        design = result.design
+                        outputs, share = self._sampled_outputs(sampler, design)
+                value = best.result.objective  # negative if an output is maximised
+                gain = (value - result.objective) / (abs(value) or 1.0) if best.share >= wanted else math.inf
+                better = share >= wanted and gain > 0.0
+                if result.violation <= NEARLY and (better or (best.share < wanted and share > best.share)):
+                    best = self._robust(result, share, outputs)
+                if spent >= self.budget or (correction and share >= wanted and not better and result.ended == "looks"):
+                    break  # prices of an unsettled search would mislead the correction
+                levels, saving = self._corrected(scatter, design, levels, outputs, reach)
+                if wanted <= share <= wanted + excess and step < STEP_SETTLED and min(saving, gain) < SAVING_SETTLED:
+                    break
+                reach *= REACH_FACTOR
+        except Dropped:
+            return replace(best, cut=True)
         nominal = Model(self.problem, Program(self.problem), best.result.design, lambda: False)
         state = nominal.state(self.problem.scaled(best.result.design[None, :])[0])
         return replace(best, result=replace(best.result, violation=state.violation, relaxation={}))
@@ -262,12 +268,15 @@ class _Calibrate:
             corrected[key] = min(max(level + min(shift, MAX_CHANGE), 0.0), MAX_LEVEL)
         return corrected, saving
 
-    def _sampled_outputs(self, design: Array) -> tuple[Columns, float]:
+    def _sampled_outputs(self, sampler: Sampler, design: Array) -> tuple[Columns, float]:
         """Return limited outputs of a design and of mechanisms around it, and the share that keeps all limits."""
-        sample = sampled_designs(self.problem.family, design, self.tolerance, self.seed, self.tolerance.samples)
-        designs = np.concatenate([design[None, :], sample])
-        outputs, mask = within_limits(self.problem, inequalities(self.problem), designs, self.problem.objective)
-        return outputs, float(mask[1:].mean())
+        problem, limits = self.problem, inequalities(self.problem)
+        names = [name for limit in limits for name in (limit.output, judged_by(limit.output))]
+        names = list(dict.fromkeys(names))
+        own = design_outputs(problem.family, design[None, :], names, problem.accuracy, problem.window)
+        made = sampler.outputs(design, names)
+        outputs = {name: np.concatenate([own[name], made[name]]) for name in names}
+        return outputs, float(keeping(limits, made).mean())
 
     @staticmethod
     def _robust(result: Result, share: float, outputs: Columns) -> Robust:
@@ -312,27 +321,13 @@ def _margin_rounds(
     return replace(final, looks=evaluations, ended=ending), radius, step
 
 
-def _yield_share(problem: Problem, design: Array, tolerance: Tolerance, seed: int) -> float:
-    """Return the share of mechanisms that keep all limits; cheap limits are tested first, and failures not further."""
-    limits, kept = inequalities(problem), sampled_designs(problem.family, design, tolerance, seed, tolerance.samples)
-    for route in routes(problem.family, [x.output for x in limits], problem.accuracy):
-        columns = design_outputs(problem.family, kept, route.outputs, problem.accuracy, problem.window)
-        kept = kept[np.logical_and.reduce([meets(x, columns[x.output]) for x in limits if x.output in route.outputs])]
-    return len(kept) / tolerance.samples
-
-
-def yields(problem: Problem, designs: Array, tolerance: Tolerance, seed: int) -> list[float]:
-    """Return the share of toleranced mechanisms about each design (k, P) that keep all limits on outputs."""
-    return [_yield_share(problem, design, tolerance, seed) for design in designs]
-
-
-def best_yield_first(problem: Problem, results: list[Result], tolerance: Tolerance, seed: int) -> list[Result]:
+def best_yield_first(sampler: Sampler, problem: Problem, results: list[Result]) -> list[Result]:
     """Return the results, first the one with the largest yield among those with the best value."""
     best = results[0]
     candidates = [r for r in results if r.feasible and abs(r.objective - best.objective) <= SAME * abs(best.objective)]
     equal = _distinct(problem, candidates)[:MOST_BASINS]
     if len(equal) < 2:
         return results
-    shares = yields(problem, np.array([r.design for r in equal]), tolerance, seed)
+    shares = [sampler.share(r.design, inequalities(problem)) for r in equal]
     first = equal[int(np.argmax(shares))]
     return [first, *(r for r in results if r is not first)]

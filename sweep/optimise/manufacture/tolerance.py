@@ -1,28 +1,27 @@
-"""Effects of manufacture on a design: exact derivatives by its dimensions, and samples of toleranced mechanisms."""
+"""Tolerances of a design's dimensions, and exact derivatives of its outputs by them."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.summaries import design_outputs
-from sweep.families.base import Accuracy, Array, Columns, Family, floats
-from sweep.families.names import MINUS, is_flag, judged_by, without_minus
+from sweep.families.base import Accuracy, Array, Family, floats
+from sweep.families.names import MINUS, is_flag, without_minus
 from sweep.optimise.extrema.gradients import level_gradients, scalar_gradient, step_gradients, stepped
 from sweep.optimise.local.model import Model
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
-from sweep.quantities.limits import Limit, compared, meets
 from sweep.quantities.measures import measure
 from sweep.quantities.resolve import output as described
-from sweep.study import Study, Tolerance
+from sweep.study import Tolerance
 
+SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
 TIE = 1e-6  # relative difference below which extrema count as equal to the largest one
 DIMENSIONS = ("length", "angle", "ratio")  # with a tolerance; ratios are dimensions of a geared drive in planet radii
 REACH = 0.1  # range of a dimension for the derivatives of step outputs, relative to the longest dimension
@@ -131,11 +130,6 @@ def _side_gradients(problem: Problem, design: Array) -> tuple[float, Array, Arra
     return value, tied.min(axis=0), tied.max(axis=0)
 
 
-SAMPLES = 2048  # a power of two: only then is a Sobol sample balanced
-SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
-BAND = (2.5, 97.5)  # percent
-
-
 def tolerances_of(family: Family, design: Array, tolerance: Tolerance) -> Array:
     """Return the tolerance (P,) of every parameter: its own, otherwise that of lengths or angles, zero for all others.
 
@@ -150,189 +144,3 @@ def _absent(family: Family, design: Array) -> NDArray[np.bool_]:
     """Tell which parameters (P,) of a design are choices or missing parts."""
     pairs = zip(family.parameters, design, strict=True)
     return np.array([p.choices is not None or (p.not_negative and x == 0.0) for p, x in pairs])
-
-
-def sampled_designs(family: Family, design: Array, tolerance: Tolerance, seed: int, samples: int = SAMPLES) -> Array:
-    """Return designs (samples, P) around a design, with independent normally distributed lengths and angles.
-
-    Parameters
-    ----------
-    family : family of the design
-    design : (P,)
-    tolerance : +- of lengths (mm) and angles (rad), three standard deviations
-    seed : seed of the scrambled Sobol sequence
-    samples : a power of two
-    """
-    sigma = tolerances_of(family, design, tolerance) / SIGMAS
-    varied = np.flatnonzero(sigma)
-    designs = np.repeat(design[None, :], samples, axis=0)
-    designs[:, varied] += sigma[varied] * _deviates(len(varied), seed, samples)
-    return designs
-
-
-@lru_cache(maxsize=2)  # designs of one search have the same sample around them, and tables a smaller one
-def _deviates(dimensions: int, seed: int, samples: int) -> Array:
-    """Return standard normal deviates (samples, dimensions) from a scrambled Sobol sequence."""
-    from scipy.special import ndtri
-    from scipy.stats import qmc
-
-    uniform = qmc.Sobol(dimensions, seed=seed).random(samples)
-    # A sample at 0 would give an infinite deviation.
-    deviates: Array = ndtri(np.maximum(uniform, 0.5 / samples))
-    return deviates
-
-
-def tolerance_rows(
-    family: Family, design: Array, outputs: Sequence[str], limits: Sequence[Limit], tolerance: Tolerance, seed: int,
-    accuracy: Accuracy, window: tuple[float, float] | None = None,
-) -> dict[str, list[Any]]:  # fmt: skip
-    """Return the distribution of design outputs under manufacturing tolerances, from 2048 designs around the given one.
-
-    A tolerance with fewer samples gives fewer designs.
-
-    Parameters
-    ----------
-    family, design : (P,) nominal design
-    outputs : names of design outputs
-    limits : limits counted in ``within``, without equations, which no toleranced mechanism keeps
-    tolerance, seed : see :func:`sampled_designs`
-    accuracy, window : as for ``summarise``
-
-    Returns
-    -------
-    Rows ``output``, ``nominal``, ``mean``, ``low``, ``high`` (2.5 and 97.5 % of the designs that have the output),
-    ``missing`` (share without it), ``within`` (share that keeps its limits; nan without a limit); a last row
-    "all limits" has only ``within``.  The share of 2048 designs is accurate to about 1 %.
-    """
-    limits = [limit for limit in limits if not limit.is_equation]
-    designs = np.concatenate(
-        [design[None, :], sampled_designs(family, design, tolerance, seed, min(SAMPLES, tolerance.samples))]
-    )
-    columns: dict[str, Any] = design_outputs(family, designs, list(outputs), accuracy, window)
-    rows: list[tuple[Any, ...]] = []
-    all_kept = np.ones(len(designs) - 1, dtype=np.bool_)
-    for output in outputs:
-        values = np.asarray(columns[output], np.float64)
-        finite = values[1:][np.isfinite(values[1:])]
-        low, high = np.percentile(finite, BAND) if len(finite) else (math.nan, math.nan)
-        kept = [meets(limit, values[1:]) for limit in limits if limit.output == output]
-        for mask in kept:
-            all_kept &= mask
-        within = float(np.logical_and.reduce(kept).mean()) if kept else math.nan
-        mean = float(finite.mean()) if len(finite) else math.nan
-        missing = 1.0 - len(finite) / len(all_kept)
-        rows.append((output, float(values[0]), mean, float(low), float(high), missing, within))
-    rows.append(("all limits", *[math.nan] * 5, float(all_kept.mean()) if limits else math.nan))
-    names = ("output", "nominal", "mean", "low", "high", "missing", "within")
-    return {name: list(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
-
-
-COST_SAMPLE = 512  # mechanisms of the sample used for the cost of each dimension
-COSTS = 8  # number of dimensions made exact, one at a time
-TELLING_GAIN = 0.004  # share of mechanisms below which 512 of them show no cost of a dimension
-
-
-class Cost(NamedTuple):
-    """Cost of one dimension's tolerance, from the same mechanisms with this dimension exact.
-
-    ``spread`` is its share in the variance of the output whose limit is violated most, ``gain`` the additional share of
-    mechanisms that keep the limits.  A design at its limit gains nothing from any single dimension.
-    """
-
-    name: str
-    text: str
-    spread: float
-    gain: float
-
-
-class Manufactured(NamedTuple):
-    """Sample of mechanisms of a design: the ``output`` violated most, its ``values`` (n,), and which keep all limits.
-
-    ``costs`` are those of its dimensions, the dearest first.
-    """
-
-    output: str
-    values: NDArray[np.generic]
-    kept: NDArray[np.bool_]
-    costs: tuple[Cost, ...]
-
-
-def limits_of_made(study: Study) -> list[Limit]:
-    """Return the inequality limits; a flag is replaced by the number that decides it, since a flag has no scatter."""
-    limits = [limit for limit in study.output_limits if not limit.is_equation]
-    return [Limit(judged_by(x.output), 0.0, None) if is_flag(x.output) else x for x in limits]
-
-
-def manufactured(study: Study, design: Array, known: Columns | None = None) -> Manufactured | None:
-    """Sample mechanisms of a design (P,); None without tolerances, a finite design, or an inequality limit.
-
-    ``known`` are outputs of these mechanisms, as far as the search has computed them.
-    """
-    limits = limits_of_made(study)
-    if study.tolerance is None or study.optimise is None or not limits or not np.isfinite(design).all():
-        return None
-    designs = sampled_designs(study.family, design, study.tolerance, study.optimise.seed, study.tolerance.samples)
-    columns, kept = within_limits(study, limits, designs, known=known)
-    worst = min(limits, key=lambda limit: float(meets(limit, columns[limit.output]).mean()))
-    subset = {name: values[:COST_SAMPLE] for name, values in columns.items()}
-    costs = _costs(study, limits, worst, design, designs[:COST_SAMPLE], subset, float(kept[:COST_SAMPLE].mean()))
-    return Manufactured(worst.output, columns[worst.output], kept, tuple(costs))
-
-
-def within_limits(
-    source: Study | Problem, limits: Sequence[Limit], designs: Array, *more: str, known: Columns | None = None
-) -> tuple[Columns, NDArray[np.bool_]]:
-    """Return limited outputs and outputs ``more`` of designs (n, P), and which designs keep all limits, (n,).
-
-    What is ``known`` of these designs is not computed again.
-    """
-    names, columns = list(dict.fromkeys([*(limit.output for limit in limits), *more])), known or {}
-    if missing := [name for name in names if name not in columns]:
-        columns = columns | design_outputs(source.family, designs, missing, source.accuracy, source.window)
-    masks = [np.ones(len(designs), np.bool_), *(meets(limit, columns[limit.output]) for limit in limits)]
-    return {name: columns[name] for name in names}, np.logical_and.reduce(masks)
-
-
-def _costs(
-    study: Study, limits: list[Limit], worst: Limit, design: Array, designs: Array,
-    columns: Columns, baseline: float,
-) -> list[Cost]:  # fmt: skip
-    """Return the dimensions by the cost of their tolerances, the most expensive first.
-
-    For the mechanisms ``designs`` the output ``columns`` are known, and the share ``baseline`` that keeps all limits.
-    The dimensions with the largest share in the variance of an output, times the share that violates its limit, are
-    made exact one at a time.  A limit that all these mechanisms keep by a standard deviation is kept then, too.
-    """
-    assert study.tolerance is not None
-    limits = [x for x in limits if x is worst or _near(x, columns[x.output])]
-    variance = _variance(columns, worst)
-    costs = []
-    varied = np.flatnonzero(tolerances_of(study.family, design, study.tolerance))
-    importance = np.zeros(len(varied))
-    for limit in limits:
-        values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
-        finite = np.isfinite(values)
-        if not finite.any():
-            continue  # no mechanism has this output, and no single dimension changes that
-        dp, dx = designs[finite][:, varied] - design[varied], values[finite] - values[finite].mean()
-        shares = (dx @ dp) ** 2 / (dp**2).sum(axis=0)
-        importance += shares / max(shares.sum(), 1e-300) * (1.0 - float(meets(limit, columns[limit.output]).mean()))
-    for k in varied[np.argsort(-importance, kind="stable")[:COSTS]]:
-        exact = designs.copy()
-        exact[:, k] = design[k]
-        parameter = study.family.parameters[k]
-        columns, kept = within_limits(study, limits, exact)
-        spread = 1.0 - _variance(columns, worst) / variance if variance > 0.0 else 0.0
-        costs.append(Cost(parameter.name, parameter.text, max(spread, 0.0), float(kept.mean()) - baseline))
-    return sorted(costs, key=lambda cost: (-cost.gain if cost.gain >= TELLING_GAIN else 0.0, -cost.spread))
-
-
-def _near(limit: Limit, column: NDArray[np.generic]) -> bool:
-    """Tell whether a value violates the limit, or is within one standard deviation of it."""
-    return not meets(limit.drawn_in(math.sqrt(_variance({limit.output: column}, limit))), column).all()
-
-
-def _variance(columns: Columns, limit: Limit) -> float:
-    values = compared(limit.output, np.asarray(columns[limit.output], np.float64))
-    finite = values[np.isfinite(values)]
-    return float(finite.var()) if finite.size else 0.0

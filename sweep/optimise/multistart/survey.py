@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from sweep.dataset.files import metadata
 from sweep.errors import how_many
 from sweep.families.base import Array
 from sweep.optimise.local.kkt import AGREE, Result
@@ -251,3 +254,14 @@ def _written(value: float, unit: str) -> str:
 def _percent(share: float) -> str:
     value = 100.0 * share
     return f"{value:.0f} %" if value >= 9.95 or value == round(value) else f"{value:.2g} %"
+
+
+def survey_of(content: dict[str, Any]) -> Survey:
+    """Return the survey stored as a dict."""
+    return Survey(**content | {"kinds": tuple(tuple(kind) for kind in content["kinds"])})
+
+
+def read_survey(path: Path) -> Survey | None:
+    """Return the survey of a search from its ``_optimum.parquet``, or None without one."""
+    content = metadata(path).get(b"search")
+    return None if content is None else survey_of(json.loads(content))
