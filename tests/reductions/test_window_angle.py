@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import sweep
+from kernels import status as st
 from sweep.errors import InputError
 from sweep.families import family
 from sweep.optimise.manufacture.tolerance import sensitivities
@@ -156,3 +157,14 @@ def test_optimiser_follows_the_window_of_the_member(three_guides, member):
     ends = [whole | {name: whole[name] + step} for step in (h, -h)]
     more, less = (sweep.summarise(machine, one, output, accuracy=1e-12, window=PART)[output].iloc[0] for one in ends)
     assert found == pytest.approx((more - less) / (2.0 * h), rel=1e-5)
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-9])
+def test_a_follower_that_stands_still_may_be_in_the_window_all_the_turn_or_never(accuracy):
+    """A cam of coefficients that are all 0 stands still: its window angle was 0 with an error of 0."""
+    still = family("cam_lever").example | {"law": 4.0} | {f"{kind}{k}": 0.0 for kind in "cs" for k in range(1, 7)}
+    found = sweep.summarise("cam_lever", still, ["window_angle", "swing"], window=(0.0, 0.01), accuracy=accuracy).iloc[
+        0
+    ]
+    assert found.status == st.OK and abs(found.swing) <= found.err_swing
+    assert found.err_window_angle == 2.0 * np.pi
