@@ -113,7 +113,7 @@ class Verbs(click.Group):
             ctx.exit(SIGNALLED + getattr(error, "number", signal.SIGINT))
         except (OSError, MemoryError, ImportError, RuntimeError) as error:
             if errors.is_memory_full(error):
-                _last_words("sweep: the memory it may use is full; fewer jobs need less")
+                _last_words("sweep: the memory it may use is full; fewer jobs, designs or poses need less")
                 ctx.exit(errors.WorkerDied.exit_code)
             if not isinstance(error, OSError) or error.errno == errno.EPIPE:  # click handles a closed pipe
                 raise

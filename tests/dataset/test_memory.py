@@ -55,7 +55,7 @@ def test_full_memory_of_the_program_itself_is_said(
     monkeypatch.setattr("sweep.dataset.store.finished_chunks", full)
     done = CliRunner().invoke(main, ["run", str(study), "--out", str(tmp_path / "designs")])
     assert done.exit_code == 70 and isinstance(done.exception, SystemExit), done.exception
-    assert said == ["sweep: the memory it may use is full; fewer jobs need less"]
+    assert said == ["sweep: the memory it may use is full; fewer jobs, designs or poses need less"]
 
 
 @pytest.mark.parametrize("bytes_allowed", mostly_long([8 * 10**8, 12 * 10**8, 16 * 10**8], [12 * 10**8]))
