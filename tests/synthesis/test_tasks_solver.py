@@ -127,6 +127,7 @@ def test_solution_reads_as_text():
         (lambda: Task2((0.5, 1.0), (3.0, 3.5), 1.0, 0.0, 0.0, (Position(1, 0.2), Position(2, 0.6))), "alpha"),
         (lambda: Task3(0.8, 3.2, (Setting(0.8),), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "another swing"),
         (lambda: Task3(0.8, 3.2, (Setting(None),), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "another swing"),
+        (lambda: Task3(0.8, 3.2, ({"swing": 0.7},), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), r"Setting\(swing, phi0\)"),
         (lambda: Task3(0.8, 3.2, (), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "at least one"),
         (
             lambda: Task3(0.8, 3.2, tuple(Setting(x, 3.2) for x in (0.7, 0.6, 0.5)), "f", (-1, 1), 1, 1, 1.3, (-1, 1)),

@@ -50,6 +50,7 @@ RULES: dict[str, Rule] = {
         lambda x: 0.0 < x[0] <= x[1] < math.inf and (x[0] - 1.0) * (x[1] - 1.0) > 0.0,
     ),
     "rho0": ("a length, positive or negative, not zero", lambda x: 0.0 < abs(x) < math.inf),
+    "settings": ("Setting(swing, phi0) each", lambda x: all(hasattr(setting, "asked") for setting in x)),
     "dwell": _TURN,
     "tolerance": _POSITIVE,
     "bounds": (
