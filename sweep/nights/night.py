@@ -92,6 +92,9 @@ class _Night:
         """Process all studies, then the page, old nights and the notification, and return the record."""
         names = ", ".join(one.name for one in studies)
         self.journal.note("night", f"night {self.folder.name}: {names}", studies=[one.name for one in studies])
+        before = archive.read_night(self.good[0]) if self.good else None
+        if absent := sorted({*(before.studies if before else ())}.difference(one.name for one in studies)):
+            self.journal.note("absent", f"not among tonight's studies: {', '.join(absent)}", studies=absent)
         records: dict[str, StudyRecord] = {}
         try:
             for one in studies:

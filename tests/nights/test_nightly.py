@@ -243,6 +243,15 @@ def test_a_study_with_faults_fails_by_itself_and_the_others_are_computed(tmp_pat
     assert not (tmp_path / "nights" / "latest").exists()
 
 
+@pytest.mark.usefixtures("in_this_process")
+def test_a_study_that_the_last_good_night_had_and_this_one_has_not_is_named(tmp_path: Path) -> None:
+    noted(tmp_path / "nights", "2026-01-01T00-00-00Z", tiny=GOOD, lost=GOOD)
+    record, said = night(tmp_path / "nights", [written(tmp_path / "tiny")])
+    assert record.good and sum(line.endswith("not among tonight's studies: lost") for line in said) == 1
+    _, said = night(tmp_path / "nights", [tmp_path / "tiny"])
+    assert not any("not among" in line for line in said)
+
+
 def test_retention_keeps_the_last_good_night_however_old(tmp_path: Path) -> None:
     names = [f"2026-01-{day:02d}T00-00-00Z" for day in range(1, 8)]
     for name in names:
