@@ -15,7 +15,7 @@ from kernels import status as st
 from kernels.types import Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, about, crossed
-from sweep.numerics.records import Mask, put
+from sweep.numerics.records import Mask, only, put
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
 from sweep.reductions.peak_search import LIMIT
@@ -53,7 +53,7 @@ def true_extrema(
     -------
     extrema : per request; nan where the status is not OK, except NOT_CONVERGED, which keeps its best value
     status : (n,) OK; NOT_ROTATABLE, UNDECIDABLE, SINGULAR, INVALID_INPUT from poses met by the search; NOT_OSCILLATING
-        for an angle without an extremum; NOT_CONVERGED where 32768 samples do not resolve the curve.  Dead points
+        for an angle without an extremum; NOT_CONVERGED where neither 32768 samples nor panels resolve it.  Dead points
         between the samples are found by the margin (`sweep.reductions.margins`).
 
     Notes
@@ -150,17 +150,23 @@ def _searched(
         for rows in blocks(pending[search.needed(pending) <= samples], samples, len(search.names)):
             search.block(rows, samples)
         pending = pending[search.needed(pending) > 0]
-        if samples == LIMIT:
-            search.status[pending] = st.NOT_CONVERGED
+        if samples == LIMIT:  # panels resolve more, but not the ends of a window
+            late = search.undone[:, pending] > 0
+            even = np.array([anywhere or request.windowed for request in requests])
+            search.status[pending[late[even].any(axis=0)]] = st.NOT_CONVERGED
+            search.torn[:, pending] |= late & ~even[:, None]
             break
         samples *= 2
     for request, torn in zip(requests, search.torn, strict=True):
-        rows = np.flatnonzero(torn)
+        rows, found = np.flatnonzero(torn), search.found[request]
         if rows.size:
             cut, now = panels.extrema(family, designs[rows], [request], target, locate)
             if family.pose_output[request.pose].wraps:  # where it all but jumps to its cut it may have passed it
                 cut_off = np.abs(np.abs(cut[request].value) - np.pi) < 2.0 * cut[request].err + OVER
                 now = np.where((now == st.OK) & cut_off, st.NOT_CONVERGED, now)
+            seen, height = (panels.measured(x, request.mode) for x in (found.value[rows], cut[request].value))
+            missed = seen - found.err[rows] > height + cut[request].err  # a peak that only the even samples saw
+            now = np.where((now == st.OK) & missed, st.NOT_CONVERGED, now)
             search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])
-            put(search.found[request], rows, cut[request])
+            put(found, rows[~missed], only(cut[request], ~missed))
     return search.found, search.status

@@ -22,7 +22,7 @@ from sweep.reductions.resolution import MATTERS, broken, denser, nearest
 from sweep.reductions.window import Window, edges
 
 START = 32  # first number of samples
-LIMIT = 32768  # largest number of samples, after which a design is NOT_CONVERGED
+LIMIT = 32768  # largest number of samples, after which panels are tried
 SHARE = 0.6  # a peak below this share of the highest sample is not refined
 ROUGH = 0.1  # fourth difference of samples relative to their size above which they do not resolve the curve
 PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
