@@ -15,6 +15,7 @@ from kernels import status as st
 from kernels.types import Status
 from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, about, crossed
+from sweep.numerics.panel_search import measured
 from sweep.numerics.records import Mask, only, put
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused, panels, peak_search
@@ -164,7 +165,7 @@ def _searched(
             if family.pose_output[request.pose].wraps:  # where it all but jumps to its cut it may have passed it
                 cut_off = np.abs(np.abs(cut[request].value) - np.pi) < 2.0 * cut[request].err + OVER
                 now = np.where((now == st.OK) & cut_off, st.NOT_CONVERGED, now)
-            seen, height = (panels.measured(x, request.mode) for x in (found.value[rows], cut[request].value))
+            seen, height = (measured(x, request.mode) for x in (found.value[rows], cut[request].value))
             missed = seen - found.err[rows] > height + cut[request].err  # a peak that only the even samples saw
             now = np.where((now == st.OK) & missed, st.NOT_CONVERGED, now)
             search.status[rows] = np.where(search.status[rows] == st.OK, now, search.status[rows])
