@@ -110,7 +110,8 @@ def test_it_leaves_while_it_optimises_with_the_best_so_far(tmp_path: Path, numbe
     assert best["role"].iloc[0] == "optimum" and best["max_abs_d2psi"].iloc[0] > 0.0
 
 
-@pytest.mark.parametrize("jobs", mostly_long(["1", "2"], ["2"]))
+@pytest.mark.long  # its search takes half a minute
+@pytest.mark.parametrize("jobs", ["1", "2"])
 def test_it_leaves_in_the_middle_of_what_is_made_with_the_optimum(tmp_path: Path, jobs: str) -> None:
     """A mechanism of this back-rest takes 8 ms, and 65 536 of them nine minutes of one core."""
     backrest = (ROOT / "studies" / "backrest" / "study.toml").read_text().partition("[limits]")[0]
@@ -127,7 +128,8 @@ def test_it_leaves_in_the_middle_of_what_is_made_with_the_optimum(tmp_path: Path
         pytest.fail("it ended before")
     left, errors = told(process, signal.SIGINT, group=True)
     assert process.returncode == SIGNALLED + signal.SIGINT, errors
-    assert left < SECONDS + SLACK and "Traceback" not in errors and "cannot be stopped" not in errors
+    assert left < SECONDS + SLACK and "Traceback" not in errors
+    # It was forced to leave before, and had written no optimum.
     best = pd.read_parquet(tmp_path / OPTIMUM)
     assert best["role"].iloc[0] == "optimum" and best["yield"].isna().all()
     assert not (tmp_path / MADE).exists() and (tmp_path / SEARCH).exists() and not list(tmp_path.glob("**/_tmp-*"))
