@@ -84,7 +84,7 @@ def peaks(designs, angles, wanted):
 
 @pytest.mark.parametrize("accuracy", [1e-2, 1e-3])
 def test_a_mean_of_samples_knows_its_error_wherever_a_peak_falls(accuracy: float) -> None:
-    """Nothing names these peaks: every other sample alone gives the same mean for one peak in fifty by chance."""
+    """Nothing names these peaks: every other sample alone gives the same mean of some peaks by chance."""
     draw, n = np.random.default_rng(8), 2000
     designs = np.tile(np.ones(8), (n, 1))
     designs[:, 0], designs[:, 1] = draw.uniform(0.0, 2.0 * np.pi, n), np.exp(draw.uniform(np.log(0.02), 0.0, n))

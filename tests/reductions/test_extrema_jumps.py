@@ -73,8 +73,8 @@ def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
     np.testing.assert_allclose(smooth["rms_drive_torque"], np.sqrt((values**2).mean(axis=1)), rtol=1e-8)
 
 
-def test_without_brackets_a_jump_is_never_resolved(monkeypatch):
-    """Negative control: it is the bracketing that ends the search, or else panels do after the most samples."""
+def test_without_brackets_a_jump_takes_the_most_samples(monkeypatch):
+    """Negative control: the bracketing ends the search early; else panels take over after the most samples."""
     taken, block = [], PeakSearch.block
 
     def counted(self, rows, samples):
