@@ -13,7 +13,7 @@ from typing import Literal, TypeAlias, cast
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Turn
-from sweep.families.capabilities import Assembly
+from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.machines.relations import EventValue, Timing
 from sweep.families.names import parts, stem, without_minus
 from sweep.quantities import kinds
@@ -40,14 +40,14 @@ LIMIT_KINDS: dict[str, Kind] = {
 class Series:
     """Curve over the turn whose extrema, or passages of a level, the optimiser follows.
 
-    ``output`` is the pose output.  With ``pressure`` it is a discriminant, and the curve is Delta/b^2 = cos^2 of that
-    pressure angle (their ratio does not depend on the crank angle, and the discriminant continues below zero).
+    ``output`` is the pose output.  If it is a discriminant, the curve is divided by ``scale``, the one of its
+    :class:`~sweep.families.capabilities.Assembly`: cos^2 of the pressure angle, continued below zero.
     ``window`` limits the curve to a part of the stroke.  ``wrapped`` curves are angles that jump by a full turn.
     ``passes`` is a level and a direction, +1 upwards or -1 downwards: the passages of the level are followed then.
     """
 
     output: str
-    pressure: str = ""
+    scale: DesignMap | None = None
     window: tuple[float, float] | None = None
     wrapped: bool = False
     passes: tuple[float, float] | None = None
@@ -171,7 +171,7 @@ def margins(family: Family, stage: str = "") -> tuple[Series, ...]:
     of_member = stage.endswith(".")
     loops = [o for o in family.every(Assembly) if o.stage == stage or (of_member and o.stage.startswith(stage))]
     selected = loops if stage else family.every(Assembly)
-    return tuple(Series(o.discriminant, pressure=o.pressure_angle) for o in selected)
+    return tuple(Series(o.discriminant, scale=o.scale) for o in selected)
 
 
 def measure(family: Family, name: str, window: tuple[float, float] | None = None) -> Measure:

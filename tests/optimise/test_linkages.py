@@ -131,6 +131,19 @@ def test_starts_that_do_not_turn_are_brought_to_turn_or_reported():
     assert results[0].status == st.OK
 
 
+def test_links_that_meet_at_no_crank_angle_are_brought_to_the_optimum_by_their_margin():
+    # From crank pin to rocker pivot it is 0.9 to h = 1.1, and coupler and rocker together reach 0.4.
+    problem = planar(-1.0, "max_pressure_angle", (held("swing", 45), held("phi0", 165)))
+    start = problem.rows(np.array([[0.1, 0.2, 0.2]]))
+    state = Model(problem, Program(problem), start[0], lambda: False).uncounted(problem.scaled(start)[0])
+    margin = 1.0 - ((1.1**2 - 2.0 * 0.2**2) / (2.0 * 0.2**2)) ** 2  # (4 b^2 c^2 - (h^2 - b^2 - c^2)^2)/(2 b c)^2
+    # A dozen roundings, and h moves by half the square of the error of its crank angle.
+    assert state.defined_violation == pytest.approx(1e-6 - margin, rel=1e-13)
+    result = minimise(problem, start, ONCE)[0]
+    assert result.status == st.OK
+    assert result.design[:3] == pytest.approx([0.270443, 0.605283, 0.730439], abs=1e-6)  # of the published example
+
+
 def test_impossible_pressure_angle_is_infeasible_and_the_relaxation_says_what_is_possible():
     # A planar crank-rocker of 60 deg swing over 165 deg cannot keep 20 deg; the least it can is found by optimising it.
     equations = (held("swing", 60), held("phi0", 165))

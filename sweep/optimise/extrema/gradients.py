@@ -94,11 +94,11 @@ def _at_edges(curves: Curves, designs: Any, points: Points, value_slopes: Array,
     neighbours = np.concatenate([base + EDGE_STEP * direction, base - EDGE_STEP * direction])
     edges, n = np.flatnonzero(points.kind == EDGE), len(direction)
     phi = moved_edges(curves.problem.family, neighbours, points.phi[edges], points.level[edges], curves.plain)
-    columns = curves.family.poses(neighbours, Angles.of(phi), curves.wanted)
+    columns: dict[str, Any] = curves.family.poses(neighbours, Angles.of(phi), curves.wanted)
     angle_slopes[edges] = ((phi[:n] - phi[n:]) / (2.0 * EDGE_STEP)).T
     for number, series in enumerate(curves.series):
         mask = points.series[edges] == number
-        x = curves.curve(series, columns)[:, mask] if mask.any() else np.zeros((2 * n, 0))
+        x = columns[series.output][:, mask]  # a curve with edges is a pose output as it is
         value_slopes[edges[mask]] = ((x[:n] - x[n:]) / (2.0 * EDGE_STEP)).T
 
 

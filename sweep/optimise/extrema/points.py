@@ -89,8 +89,7 @@ class Curves:
         numbers = {s: n for n, s in enumerate(series) if s in followers}
         numbers |= {s: numbers[p] for s, p in zip((s for s in series if s.window is not None), followers, strict=True)}
         self.position: Indices = np.array([numbers.get(s, -1) for s in series], np.intp)
-        names = {s.output for s in series} | {s.pressure for s in series if s.pressure}
-        self.wanted = frozenset(names)
+        self.wanted = frozenset(s.output for s in series)
         self.with_angles = with_angles
         self.plain = tuple(s.output for s in series if _is_plain(s))
         self.may_bend = scanned.may_bend(problem.family, self.plain)
@@ -120,9 +119,10 @@ class Curves:
         windowed = [n for n, s in enumerate(self.series) if s.window is not None]
         for n, s in enumerate(self.series):
             if s.passes is not None:
-                rows += scanned.passages(n, phi, self.curve(s, columns)[0], *s.passes)
+                rows += scanned.passages(n, phi, columns[s.output][0], *s.passes)
             elif n not in windowed:
-                x, margin = self.curve(s, columns)[0], self._margin(n, design[None, :], phi)[0]
+                x = self.curve(s, design[None, :], columns)[0]
+                margin = self._margin(n, design[None, :], phi)[0]
                 for sense in (1.0, -1.0):
                     rows += scanned.extrema(n, phi, x + sense * margin, s.wrapped, sense)
         initial = Points.of(rows)
@@ -148,8 +148,9 @@ class Curves:
         edge_columns = self.poses(design[None, :], sides.ravel())
         rows = []
         for n in bent:
-            values = self.curve(self.series[n], edge_columns)[0].reshape(sides.shape)
-            rows += scanned.edge_extrema(n, sides, numbers, values, self.curve(self.series[n], columns)[0])
+            output = self.series[n].output
+            values = edge_columns[output][0].reshape(sides.shape)
+            rows += scanned.edge_extrema(n, sides, numbers, values, columns[output][0])
         at_edges = Points.of(rows)
         at_edges = replace(at_edges, value=self.values(design[None, :], at_edges)[0])
         # An extremum beside an edge is the edge itself; elsewhere a point that ends lower than it began is put back.
@@ -161,13 +162,11 @@ class Curves:
         restored = replace(initial, kind=np.full(len(initial), scanned.STATIC)).take(descended & ~near_edge)
         return Points.joined(Points.joined(points.take(~descended & ~near_edge), restored), at_edges)
 
-    def curve(self, series: Series, columns: dict[str, Any]) -> Any:
-        """Return the values (n, m) of a series from pose outputs."""
+    def curve(self, series: Series, designs: Any, columns: dict[str, Any]) -> Any:
+        """Return the values (n, m) of a series from pose outputs of designs (n, P)."""
         x = columns[series.output]
-        if series.pressure:
-            with np.errstate(invalid="ignore"):
-                x = x / scanned.discriminant_scale(x, columns[series.pressure])
-        return x
+        with np.errstate(all="ignore"):  # a design outside the domain of its kernel has no curve
+            return x if series.scale is None else x / series.scale(designs)[:, None]
 
     def _margin(self, n: int, designs: Any, phi: Any) -> Any:
         """Return the tolerance margin added to the maxima of series n and subtracted from its minima, (n, m)."""
@@ -233,13 +232,13 @@ class Curves:
         """Return the curves' values (n, K) for designs (n, P) at the points' crank angles."""
         if not self.wanted:  # an output computed by a step alone needs no curve
             return np.empty((len(designs), len(points)), dtype=np.result_type(designs))
-        columns = self.poses(designs, self._angles(points))
+        columns = self.poses(designs, points.phi)
         out = np.empty((len(designs), len(points)), dtype=columns[next(iter(self.wanted))].dtype)
         for n, s in enumerate(self.series):
             mask = points.series == n
             if not mask.any():
                 continue
-            out[:, mask] = self.curve(s, columns)[:, : len(points)][:, mask]
+            out[:, mask] = self.curve(s, designs, columns)[:, mask]
             if s.output in self.problem.curve_margins:
                 out[:, mask] += points.sense[mask] * self._margin(n, designs, points.phi[mask])
             if s.wrapped:
@@ -252,12 +251,6 @@ class Curves:
     def positions(self, designs: Any, points: Points) -> Any:
         """Return the position of the follower that defines each point's window, (n, K), at the points' crank angles."""
         return self.values(designs, replace(points, series=self.position[points.series], value=np.zeros(len(points))))
-
-    def _angles(self, points: Points) -> Array:
-        """Return the points' angles, followed by 16 angles that give the scale of a discriminant."""
-        if any(s.pressure for s in self.series):
-            return np.concatenate([points.phi, np.arange(16) * (math.pi / 8.0)])
-        return points.phi
 
     def _derivatives(
         self, design: Array, phi: Array, points: Points, by_series: list[tuple[Series, Indices]]
@@ -296,9 +289,9 @@ class Curves:
         low, high = self.stroke(points, n)
         if series.window is None or low < 0:
             return []
-        s = self.curve(self.series[self.position[n]], columns)[0]
+        s = columns[self.series[self.position[n]].output][0]
         share = (s - points.value[low]) / (points.value[high] - points.value[low])
-        x = self.curve(series, columns)[0]
+        x = columns[series.output][0]
         rows = []
         for edge in series.window:
             if edge in (0.0, 1.0):
@@ -315,7 +308,7 @@ class Curves:
 
 
 def _is_plain(series: Series) -> bool:
-    return not (series.pressure or series.wrapped or series.passes) and series.window is None
+    return not (series.scale or series.wrapped or series.passes) and series.window is None
 
 
 def _without_duplicates(points: Points) -> Points:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Collection, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -199,17 +199,3 @@ def _arc(start: Array, end: Array) -> Array:
 def _bends(family: Family, name: str) -> bool:
     output = family.pose_output[name]
     return output.kinks or output.jumps
-
-
-def discriminant_scale(discriminant: Any, pressure_angle: Any) -> Any:
-    """Return the ratio of a discriminant to cos^2 of the pressure angle, (n, 1): one number for all crank angles.
-
-    It is taken at the pose whose pressure angle is nearest to half a radian: well away from the dead points, where the
-    ratio is 0/0, and from a pressure angle of zero, where the angle (not its cosine) has a kink.
-    """
-    angle = pressure_angle.real
-    distance = np.where(np.isfinite(angle), np.abs(angle - 0.5), np.inf)
-    best = np.arange(len(angle)), np.argmin(distance, axis=1)
-    cos = np.cos(pressure_angle[best])
-    with np.errstate(invalid="ignore"):  # if no pose assembles, the scale is nan, and so is everything that needs it
-        return (discriminant[best] / (cos * cos))[:, None]

@@ -143,7 +143,7 @@ class Descent:
         for _ in range(ROUNDS):
             previous = self.best
             if math.isinf(previous.defined_violation):
-                return  # the mechanism cannot be assembled: it has no extrema to follow
+                return  # a stage without a margin, as behind one that does not turn: nothing to follow
             slow = self._rounds(slsqp.propose, relaxed=True, tol=1e-4, patience=patience)
             if slow and self.best.form.complete:
                 self._rounds(newton.propose, relaxed=True, tol=1e-4)

@@ -128,7 +128,7 @@ def curves_with_margin(problem: Problem) -> dict[str, str]:
     return {
         name: s.output
         for name, s in limits.items()
-        if s.output not in other_curves and not s.pressure and not s.wrapped and name != problem.objective
+        if s.output not in other_curves and not s.scale and not s.wrapped and name != problem.objective
     }
 
 

@@ -102,8 +102,8 @@ class Program:
         sums = layout.upper(self.objective)
         for term, shift in sums:
             layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
-        assembles = all(curves.series.index(s) in points.series for s in self.turning.series)
-        return layout.form(complete and bool(sums), assembles)
+        has_margins = all(curves.series.index(s) in points.series for s in self.turning.series)
+        return layout.form(complete and bool(sums), has_margins)
 
     def reading_point(self, name: str, curves: Curves, design: Array, points: Points) -> int:
         """Return the number of the point at which one of the ``readings`` is taken; -1 if the design has none."""
@@ -130,7 +130,7 @@ def _bound_shift(quantity: Measure, bound: float | None, allowance: Allowance | 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
     """Return the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
-    unscaled = r.measure.inner == "pressure" or any(s.pressure for s in r.measure.series)
+    unscaled = r.measure.inner == "pressure" or any(s.scale for s in r.measure.series)
     return Label(r.measure.name, side, 1.0 if unscaled else abs(bound) / size)
 
 
@@ -294,7 +294,7 @@ class _Layout:
         """
         if r.measure.inner == "pressure":
             return 1.0 + bound  # sin^2 of the limit: a few degrees are as hard a limit as forty
-        if any(s.pressure for s in r.measure.series):
+        if any(s.scale for s in r.measure.series):
             return 1.0
         if r.measure.numbers:
             return violation_scale(max(abs(r.minimum or 0.0), abs(r.maximum or 0.0)))
@@ -302,7 +302,7 @@ class _Layout:
         amplitude = 1.0 if r.measure.is_angle else max((abs(self.points.value[k]) for k in extrema), default=0.0)
         return violation_scale(max(abs(bound), 1e-3 * amplitude))
 
-    def form(self, complete: bool, assembles: bool) -> Form:
+    def form(self, complete: bool, has_margins: bool) -> Form:
         matrix = np.zeros((len(self.terms), 2 * len(self.points) + len(self.scalars)))
         for row, term in enumerate(self.terms):
             for k, weight in term.items():
@@ -310,5 +310,5 @@ class _Layout:
         constant, slack, equal, labels = (list(c) for c in zip(*self.rows, strict=True)) if self.rows else ([],) * 4
         return Form(
             self.points, self.scalars, matrix, np.array(constant, np.float64), np.array(slack, np.float64),
-            np.array(equal, np.bool_), tuple(labels), complete, assembles,
+            np.array(equal, np.bool_), tuple(labels), complete, has_margins,
         )  # fmt: skip

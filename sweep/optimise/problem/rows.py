@@ -35,8 +35,8 @@ class Label:
 class Form:
     """Rows of the program and the points whose curves they use.
 
-    ``complete`` says that the design turns and every limit exists for it, ``assembles`` that every stage assembles
-    somewhere, so that its margin measures the distance from turning.
+    ``complete`` says that the design turns and every limit exists for it, ``has_margins`` that every stage has a
+    margin, which measures its distance from turning; a stage behind one that does not turn has none.
     """
 
     points: Points
@@ -47,7 +47,7 @@ class Form:
     equal: Mask
     labels: tuple[Label, ...]
     complete: bool
-    assembles: bool
+    has_margins: bool
 
     def rows(self, atoms: Array, t: float) -> Array:
         """Return the rows' values; a row that is nan counts as far outside."""
@@ -72,9 +72,9 @@ class Form:
     def defined_violation(self, atoms: Array) -> float:
         """Return the largest scaled violation of the limits that exist for this design.
 
-        It is infinite if some stage of the design assembles nowhere.
+        It is infinite if some stage has no margin.
         """
-        if not self.assembles:
+        if not self.has_margins:
             return math.inf
         values = self.constant + self.matrix @ atoms
         limits = np.array([label.side != "objective" for label in self.labels], dtype=np.bool_)
