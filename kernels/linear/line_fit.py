@@ -157,6 +157,20 @@ def _among(points: NDArray[np.int64], j: int) -> bool:
 
 
 @inline
+def _farthest(
+    target: Array, dx: Array, dy: Array, inside: NDArray[np.bool_], x: Array, level: float
+) -> tuple[int, float]:
+    """Find the masked position with the largest residual and that residual; -1 and ``level`` if none exceeds it."""
+    worst, worst_size = -1, level
+    for j in range(dx.size):
+        if inside[j]:
+            r = abs(target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2])
+            if r > worst_size:
+                worst, worst_size = j, r
+    return worst, worst_size
+
+
+@inline
 def _exchange(
     target: Array,
     dx: Array,
@@ -168,7 +182,6 @@ def _exchange(
     points: NDArray[np.int64],
 ) -> bool:
     """Find the minimax x = (w_x, w_y, h) of |target + w_x dy + w_y dx - h| over masked points, from least squares."""
-    m = dx.size
     if not _first_reference(target, dx, dy, inside, x, points):
         return False
     weights, rounding = np.empty(4), _rounding(target, x)
@@ -194,12 +207,7 @@ def _exchange(
         if not _solve3(a, y):
             return False
         x[0], x[1], x[2] = y[0], y[1], y[2]
-        worst, worst_size = -1, abs(level)
-        for j in range(m):
-            if inside[j]:
-                r = abs(target[j] + x[0] * dy[j] + x[1] * dx[j] - x[2])
-                if r > worst_size:
-                    worst, worst_size = j, r
+        worst, worst_size = _farthest(target, dx, dy, inside, x, abs(level))
         # A point of the reference exceeds the level by the rounding of the elimination alone: neighbours among the four
         # make it ill-conditioned, and the point would replace itself for ever.
         if worst < 0 or worst_size <= abs(level) * (1.0 + 1e-9) + rounding or _among(points, worst):

@@ -51,7 +51,7 @@ def as_crank_rocker(designs: Array) -> Array:
     """Design matrix of the same linkage as a crank-rocker, (n, 8); nan if the coupler point is invalid."""
     matrix = np.zeros((len(designs), len(crank_rocker.PARAMETERS)), designs.dtype)
     matrix[:, :4], matrix[:, 7] = designs[:, :4], designs[:, 6]
-    matrix[:, 0] += 0.0 * (designs[:, 4] + designs[:, 5])
+    matrix[~np.isfinite(designs[:, 4:6]).all(axis=1), 0] = np.nan
     return matrix
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tomllib
 
 import ezdxf
+import mujoco
 import pytest
 import trimesh
 from click.testing import CliRunner
@@ -12,7 +13,8 @@ from click.testing import CliRunner
 import sweep
 from sweep.cli import main
 from sweep.exchange.points import read_points, reader_of
-from tests.exchange.test_export import MM, chain_design, scaled
+from sweep.families import family
+from tests.exchange.test_export import LINKED, MM, chain_design, scaled
 
 PRECISION = {
     "csv": 1e-11,
@@ -68,3 +70,10 @@ def test_files_of_other_programs_are_refused_as_points(tmp_path):
     ):  # fmt: skip
         with pytest.raises(sweep.InputError, match=match):
             read_points(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", LINKED)
+def test_mujoco_takes_bars_of_a_mechanism_of_a_few_millimetres(name, tmp_path):
+    """It refused them: the inertia of such a bar along itself is 4e-17 kg m^2, and it takes none below 1e-15."""
+    model = mujoco.MjModel.from_xml_path(str(sweep.export(name, dict(family(name).example), tmp_path / "m.xml")))
+    assert model.body_inertia[1:].min() >= 2e-15 and model.body_inertia[1:].max() < 1e-10

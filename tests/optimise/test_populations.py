@@ -14,10 +14,7 @@ import pytest
 import sweep
 from kernels import status as st
 from kernels.curves.sampled_rows import RANGE
-from kernels.descent.descents import _copy, _empty_design, _evaluate
-from kernels.descent.motion import motion_of
-from kernels.descent.rows import UNKNOWNS, Task, columns_of
-from kernels.jit import kernel
+from kernels.descent.rows import UNKNOWNS
 from sweep.families.base import Angles
 from sweep.families.capabilities import Assembly
 from sweep.optimise.local.kkt import Result
@@ -32,6 +29,7 @@ from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.posing import problem_of
 from sweep.optimise.starts.proportions import PopulationSize, Proportions, from_populations
 from sweep.study import Study, study_from_data
+from tests.support.descent_rows import rows_at
 from tests.support.needle208_record import record
 
 EXPECTED = json.loads((Path(__file__).parents[2] / "studies" / "needle208" / "expected.json").read_text())["record"]
@@ -82,20 +80,6 @@ def around_record(rows: PoseRows, count: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(1)
     places = np.clip(place_of_record(rows) + 0.003 * rng.standard_normal((count, len(rows.columns))), 0.01, 0.99)
     return places, rows.initial(places, FIRST[:count])[0]
-
-
-@kernel
-def rows_at(
-    task: Task, kind: int, place: np.ndarray, x: np.ndarray, values: np.ndarray, slopes: np.ndarray
-) -> None:  # fmt: skip
-    """Compute the rows (r,) of one design that turns, and their gradients (n + 5, r) by places and unknowns."""
-    d = _empty_design(task)
-    _copy(place, d.place)
-    _copy(x, d.x)
-    columns_of(task, kind, d.place, d.row)
-    motion_of(d.row, task.cos, task.sin, d.motion)
-    _evaluate(task, kind, d, slopes)
-    _copy(d.values, values)
 
 
 def rows_of(rows: PoseRows, place: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
