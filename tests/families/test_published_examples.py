@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import sweep
 from sweep.evaluation import thread
@@ -283,3 +284,67 @@ def test_coupler_point_is_where_solvespace_puts_it() -> None:
     design = {"a": 35.0, "b": 70.0, "c": 70.0, "e": 90.0, "xi": 35.0, "eta": math.sqrt(375.0), "branch": -1}
     found = sweep.evaluate("four_bar", design, "x_m, y_m", phi="45 deg").iloc[0]
     assert (found["x_m"], found["y_m"]) == pytest.approx((39.54852, 61.91009), abs=1e-5)  # cut, not rounded
+
+
+@pytest.mark.parametrize(
+    ("branch", "omega", "eps"), [(-1, (-5.99, -3.99), (26.1, 53.3)), (1, (-0.66, -2.66), (77.9, 50.7))]
+)
+def test_four_bar_of_norton_has_the_printed_velocities_and_accelerations(
+    branch: int, omega: tuple[float, float], eps: tuple[float, float]
+) -> None:
+    # Design of Machinery, tables P6-4 and P7-1, row a: the position problem at 10 rad/s; coupler, then rocker.  Quoted
+    # without the book at hand.
+    design = {"a": 2.0, "b": 7.0, "c": 9.0, "e": 6.0, "branch": branch}
+    found = sweep.evaluate("four_bar", design, "omega_z, dpsi, eps_z, d2psi", phi="30 deg").iloc[0]
+    assert (10.0 * found["omega_z"], 10.0 * found["dpsi"]) == pytest.approx(omega, abs=0.005)
+    assert (100.0 * found["eps_z"], 100.0 * found["d2psi"]) == pytest.approx(eps, abs=0.05)
+
+
+def test_engine_of_beer_and_johnston_has_the_printed_motion() -> None:
+    # Vector Mechanics, sample problems 15.3 and 15.7: crank 3 in, rod 8 in, 2000 rev/min clockwise, crank at 40 deg.
+    # Quoted without the book at hand.
+    found = sweep.evaluate(
+        "slider_crank", {"a": 3.0, "b": 8.0}, "pressure_angle, ds, d2s, omega_z, eps_z", phi="40 deg"
+    )
+    rod, speed = found.iloc[0], -2000.0 * math.pi / 30.0
+    assert math.degrees(rod["pressure_angle"]) == pytest.approx(13.95, abs=0.005)
+    assert rod["omega_z"] * speed == pytest.approx(62.0, abs=0.05)
+    assert rod["ds"] * speed / 12.0 == pytest.approx(43.6, abs=0.05)
+    assert rod["eps_z"] * speed**2 == pytest.approx(9940.0, abs=5.0)
+    assert -rod["d2s"] * speed**2 / 12.0 == pytest.approx(9290.0, abs=5.0)
+
+
+def test_linkage_of_beer_and_johnston_has_the_printed_accelerations() -> None:
+    # Sample problem 15.8: AB = 8i + 14j, BD = 12i + 3j, ED = -17i + 17j in inches, 20 rad/s.
+    drawn = sweep.from_points("four_bar", A=[0, 0, 0], B=[8, 14, 0], C=[20, 17, 0], D=[37, 0, 0])
+    design = drawn.parameters | {"branch": drawn.branch}
+    found = sweep.evaluate("four_bar", design, "omega_z, dpsi, eps_z, d2psi", phi=drawn.phi).iloc[0]
+    assert (20.0 * found["omega_z"], 20.0 * found["dpsi"]) == pytest.approx((-29.33, 11.29), abs=0.005)
+    assert (400.0 * found["eps_z"], 400.0 * found["d2psi"]) == pytest.approx((-645.0, 809.0), abs=0.5)
+
+
+def test_slider_is_fastest_where_the_cubic_of_zhang_and_li_says() -> None:
+    # J. Mech. Des. 128 (2006), 654: with k = b/a, sin^2 phi is a root of u^3 - k^2 u^2 - k^4 u + k^4 = 0.  For k = 3
+    # encyclopaedias print 73.17615 deg; the root is 73.17530 deg.
+    for k in (3.0, 4.5):
+        found = sweep.summarise("slider_crank", {"a": 2.0, "b": 2.0 * k}, "phi_max_abs_ds", accuracy=1e-12)
+        square = math.sin(found["phi_max_abs_ds"][0]) ** 2
+        (root,) = (u.real for u in np.roots([1.0, -(k**2), -(k**4), k**4]) if 0.0 < u.real < 1.0)
+        assert square == pytest.approx(root, rel=1e-11)  # a place is flat to the root of the value's accuracy
+
+
+def test_shedding_linkages_have_the_printed_coupler_points() -> None:
+    # Advanced Textile Technology (China) 2024, 6: crank, coupler and rocker 1 : 2 : 2, the coupler point as far from
+    # the rocker pin as the crank pin is.  Where crank and frame are in line its path is straight to third order (frame
+    # 2.76, angle at the crank pin 62.49 deg, found by drawing), or curved by equal radii (2.3, 49.15 deg, computed).
+    def curvatures(frame: float, degrees: float) -> np.ndarray:
+        x, y = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        design = {"a": 1.0, "b": 2.0, "c": 2.0, "e": frame, "xi": 4.0 * x * x, "eta": 4.0 * x * y, "branch": -1}
+        path = sweep.evaluate("four_bar", design, "dx_m, dy_m, d2x_m, d2y_m", phi=[0.0, math.pi])
+        turn = path["dx_m"] * path["d2y_m"] - path["dy_m"] * path["d2x_m"]
+        return np.asarray(turn / np.hypot(path["dx_m"], path["dy_m"]) ** 3)
+
+    # 0.1 deg of the drawing moves the curvature of the two places by 3e-3.
+    assert np.abs(curvatures(2.76, 62.49)).max() < 3e-3
+    equal = brentq(lambda degrees: curvatures(2.3, degrees).sum(), 45.0, 55.0)
+    assert equal == pytest.approx(49.15, abs=0.005)

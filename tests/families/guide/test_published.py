@@ -57,3 +57,12 @@ def test_guide_chebyshev_lambda_linkage():
     np.testing.assert_allclose(frame.dev[[0, 1000, 2000]], 0.0, atol=2e-15)
     assert np.ptp(frame.s) == pytest.approx(4.0, abs=4e-15)
     assert np.ptp(frame.dev) == pytest.approx(0.009753733, abs=1e-8)
+
+
+def test_guide_chebyshev_linkage():
+    # Cranks 5 on a frame of 4, crossed, coupler 2: its middle is exactly on the line at both ends and in the middle.
+    links = {"a": 5.0, "b": 2.0, "c": 5.0, "e": 4.0, "xi": 1.0, "branch": 1.0}
+    phi = np.array([np.arctan2(3.0, 4.0), np.arctan2(4.0, 3.0), 0.5 * np.pi])
+    frame = sweep.evaluate("guide", links | LINE | {"h": 4.0}, ["s", "dev"], phi)
+    np.testing.assert_allclose(frame.s, [4.0, 2.0, 0.0], atol=4e-15)
+    np.testing.assert_allclose(frame.dev, 0.0, atol=2e-15)
