@@ -124,5 +124,6 @@ def improve(problem: Problem, design: Mapping[str, float], should_stop: Callable
         "ended": result.ended,
         "feasible": result.feasible,
         "active": list(result.active),
+        "missed": list(result.relaxation),
         "looks": result.looks,
     }

@@ -14,6 +14,7 @@ from sweep.chunks.plan import PARAMETER_UNITS
 from sweep.errors import InputError, nearest
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Family, Parameter
+from sweep.families.machines.machine import Machine
 from sweep.families.names import is_flag
 from sweep.optimise.starts.dataset import random_designs
 from sweep.report.dataset import Dataset, Row, chosen, read_dataset, reference_of, row_of, without_rows
@@ -41,7 +42,7 @@ PINS = 3
 class PageDimension:
     """A dimension of the page; ``factor`` converts the stored value to ``unit``; ``swept`` if the study sweeps it.
 
-    ``positive`` says that it may not be negative.
+    ``positive`` says that it may not be negative.  ``group`` is the heading under which it stands.
     """
 
     name: str
@@ -53,6 +54,7 @@ class PageDimension:
     choices: tuple[float, ...]
     swept: bool
     positive: bool
+    group: str
 
 
 class Hand:
@@ -97,8 +99,14 @@ class Hand:
         low = value * (1.0 - REACH) if p.positive and low <= 0.0 else low
         return PageDimension(
             p.name, p.text, shown.unit, shown.factor, low, high, tuple(p.choices or ()),
-            swept and low < high, positive,
+            swept and low < high, positive, self._group(p.name),
         )  # fmt: skip
+
+    def _group(self, name: str) -> str:
+        """Return the member that has a dimension, with the inputs of effects apart."""
+        member, dot, _ = name.partition(".")
+        words = [member] if dot else ["machine"] if isinstance(self.study.bare, Machine) else []
+        return ", ".join(words if name in self.own else [*words, "masses and loads"]) or "mechanism"
 
     def design(self, given: Mapping[str, object]) -> dict[str, float]:
         """Return the complete design for the dimensions that a page sends, in internal units.

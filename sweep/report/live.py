@@ -21,7 +21,7 @@ from sweep.errors import InputError
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import Part, parts
 from sweep.exchange.scene import PlacedPart, extent, is_spatial, shown_name, side_by_side
-from sweep.families.base import Angles, Array, Family, Interval
+from sweep.families.base import Angles, Array, Family, Interval, Turn
 from sweep.families.names import is_flag, is_largest, reduced, stem
 from sweep.families.poses import equal_steps
 from sweep.quantities.limits import compared
@@ -157,7 +157,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
         "axis": f"{family.domain.text}{phase}",
         "unit": variable.unit,
         "size": max(design["size"] for design in designs),
-        "plane": bool(joints) and not is_spatial(joints),
+        "draggable": bool(joints) and not is_spatial(joints) and isinstance(family.domain, Turn),
         "curves": [_panel(data, name, motions) for name in names],
         "designs": designs,
     }

@@ -10,7 +10,7 @@ import pytest
 import sweep
 from sweep.report.quantities import quantity
 from tests.support.browser import DRAWS, launcher, pixels
-from tests.support.explorer import explored
+from tests.support.explorer import ROOT, explored
 
 pytestmark = pytest.mark.browser
 MOVE = """([name, value]) => {
@@ -22,6 +22,7 @@ MOVE = """([name, value]) => {
 OUTSIDE = """() => [...document.querySelectorAll('main *')]
     .filter((e) => !e.closest('.table, .view, .panels') && e.getBoundingClientRect().right > innerWidth + 1)
     .map((e) => e.outerHTML.slice(0, 80))"""
+STUDIES = ROOT / "studies"
 PATIENCE = 60  # seconds, on a busy machine
 
 
@@ -275,8 +276,32 @@ def test_a_drive_that_turns_fully_ends_its_turn_and_has_no_table_of_no_limits(br
         page.close()
 
 
+def test_many_dimensions_stand_in_groups_in_a_column_of_their_own(browser):
+    with explored(STUDIES / "head208") as address:
+        page = browser.new_page(viewport={"width": 1400, "height": 900})
+        page.goto(address)
+        until(lambda: answers(page) >= 1)
+        groups = page.locator("#dimensions details")
+        heads = [text.rsplit(maxsplit=1) for text in groups.locator("summary").all_inner_texts()]
+        assert [head for head, _ in heads[:2]] == ["needle", "needle, masses and loads"]
+        assert [int(count) for _, count in heads] == [
+            groups.nth(k).locator(".dimension").count() for k in range(len(heads))
+        ]
+        # what the study sweeps is in sight, the rest is a click away
+        swept = page.evaluate("[...new Set(page.ranges.filter((r) => r.swept).map((r) => r.group))]")
+        assert [head for k, (head, _) in enumerate(heads) if groups.nth(k).get_attribute("open") is not None] == swept
+        column = page.locator("#dimensions")
+        page.evaluate("scrollTo(0, 1e5)")
+        page.wait_for_timeout(100)
+        box = column.bounding_box()
+        assert box["y"] >= 0.0 and box["y"] + box["height"] <= 900.0  # however far the page is scrolled
+        assert page.locator("#drags").is_hidden()  # a spatial mechanism
+        page.close()
+
+
 def test_dragged_joint_changes_the_dimensions(opened):
     page = opened()
+    assert page.locator("#drags").is_visible()
     before = page.evaluate("design")
     place = """() => {
         const view = moving.view, point = view.points.find((p) => p.label.textContent === 'C');

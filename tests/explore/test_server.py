@@ -133,6 +133,14 @@ def test_improves_within_the_sliders_and_tells_how_far_it_is(address):
     assert abs(best) >= np.radians(35.0) * (1.0 - 1e-6)  # as near as a limit is called active
 
 
+def test_a_search_that_finds_no_feasible_design_names_the_limits_that_it_misses(address):
+    last = improved(address, free={"a": [8.0, 8.1]}, design=DESIGN | {"a": 8.0, "c": 50.0})[-1]
+    assert not last["feasible"] and last["missed"] == ["max_pressure_angle", "swing"]
+    nearest = sweep.mechanism("four_bar", **{n: last["design"][n] for n in DESIGN})
+    found = nearest.outputs(["max_pressure_angle", "swing"])
+    assert abs(found["swing"]) < np.radians(35.0) and found["max_pressure_angle"] > np.radians(50.0)
+
+
 def test_nothing_to_vary_is_said(address):
     assert "ticked" in refused(address, "improve", {"design": DESIGN, "free": {}})[1]
 

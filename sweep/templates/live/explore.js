@@ -65,6 +65,7 @@ async function pull(to) {
 
 function show(answer) {
   const motion = answer.motion;
+  by("drags").hidden = !motion?.draggable;
   if (motion) {
     motion.steady = steady;
     if (moving) moving.replace(motion);
@@ -143,8 +144,21 @@ function put(range) {
   row.slider.value = value;
 }
 
+// Dimensions of one kind stand together; those groups are open at first in which something is swept.
+function group(name) {
+  const own = page.ranges.filter((range) => range.group === name);
+  if (own.length === page.ranges.length) return by("dimensions");
+  const swept = page.ranges.filter((range) => range.swept), first = swept.length ? swept : page.ranges.slice(0, 1);
+  const host = made("details", by("dimensions"), { open: first.some((range) => range.group === name) });
+  const head = made("summary", host, { textContent: `${name} ` });
+  made("small", head, { textContent: String(own.length) });
+  return host;
+}
+
+const groups = {};
 function addDimension(range) {
-  const host = made("div", by("dimensions"), { className: "dimension" }), id = `d-${range.name}`;
+  const home = (groups[range.group] ??= group(range.group));
+  const host = made("div", home, { className: "dimension" }), id = `d-${range.name}`;
   const tick = made("input", host, { type: "checkbox", checked: range.swept, ariaLabel: `${range.name} may vary` });
   tick.disabled = range.choices.length > 0;
   tick.addEventListener("change", () => { if (tick.checked) free[range.name] = true; else delete free[range.name]; });
@@ -241,7 +255,7 @@ async function improve() {
         if (line.error) throw new Error(line.error);
         const held = line.active?.length ? `; held back by ${line.active.join(", ")}` : "";
         const how = { converged: "converged", time: "stopped" }[line.ended] ?? "not converged";
-        const end = `${line.feasible ? how : "some limits are missed"} after ${line.looks} evaluations${held}`;
+        const end = `${line.feasible ? how : `misses ${line.missed?.join(", ")}`} after ${line.looks} evaluations${held}`;
         if (line.design) await take(line.design, end);
         else say(`searching: ${line.looks} evaluations, ${line.seconds.toFixed(1)} s`);
       }

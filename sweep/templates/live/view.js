@@ -192,7 +192,7 @@ class MechanismView {
     const canvas = this.renderer.domElement;
     let held = null;
     const near = (event) => {
-      if (!this.data.plane) return null;
+      if (!this.data.draggable) return null;
       const box = canvas.getBoundingClientRect();
       const far = (point) => {
         const place = point.at(this.share).clone().applyMatrix4(point.group.matrixWorld).project(this.camera);
