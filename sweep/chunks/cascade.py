@@ -32,7 +32,7 @@ from sweep.synthesis.fit import driving_outputs, fit_line
 # BATCH_SECONDS, so that a stop is noticed in between.
 BLOCK = 16384
 BATCH_SECONDS = 0.1
-FEWEST = 64
+FEWEST = 8  # a search on poses takes a twelfth longer than in batches of 64
 # Measured: the time [s] that a call of a route takes even for a few designs.
 CALL_SECONDS = 1e-3
 

@@ -159,7 +159,7 @@ def test_survivors_wait_until_they_are_enough(study: Study, monkeypatch: pytest.
 
 
 def test_dear_routes_get_small_batches_and_cheap_ones_no_more_than_the_caches_hold(study: Study) -> None:
-    assert [Level(None, ns).batch for ns in (0.0, 40.0, 1e5, 1e9)] == [16384, 16384, 1000, 64]
+    assert [Level(None, ns).batch for ns in (0.0, 40.0, 1e5, 1e9)] == [16384, 16384, 1000, 8]
     assert all(level.batch == 16384 for level in levels(study))
 
 
