@@ -113,6 +113,8 @@ def test_flywheel_of_khurmi_and_gupta_takes_the_printed_energy(
         (500.0, 400.0, 24.0 * np.pi, (0.56, 1.527, 0.285), 7900.0, 890.8, 16150.0, 5.0),
         # Wentzell, Machine Design, example 20-1: 2400 lbf across at 1750 rev/min.
         (2400.0, 0.0, 1750.0 * np.pi / 30.0, (0.56, 1.5, 0.3), 5050.0, 2400.0, 88.73, 0.005),
+        # SKF, Rolling bearings, first example of lives: a 6309 under 10 kN across at 3000 rev/min; from memory.
+        (10.0, 0.0, 100.0 * np.pi, (0.56, 1.5, 0.3), 55.3, 10.0, 940.0, 5.0),
     ],
 )
 def test_ball_bearing_has_the_printed_load_and_life(

@@ -1,0 +1,83 @@
+"""Theorems of the literature that hold exactly: Roberts' cognates, Bennett's linkage, Hooke's joints, the wobble drive.
+
+The theorems are closed forms that share no equation with the kernels; tolerances are roundings of float64.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sweep
+
+ANGLES = np.radians([14.0, 75.0, 120.0, 163.0, 200.0, 255.0, 290.0, 340.0])
+
+
+def test_cognate_linkage_of_roberts_draws_the_same_coupler_curve() -> None:
+    """Roberts 1875, Chebyshev 1878.  The cognate on the crank's pivot turns with the coupler of the first linkage.
+
+    With m = (xi + i eta)/b its links are those of the first in the order b, a, c, e, all turned and stretched by m.
+    """
+    first = {"a": 2.0, "b": 6.0, "c": 5.0, "e": 6.5, "xi": 3.0, "eta": 2.5, "branch": -1.0}
+    path = "x_m, y_m, dx_m, dy_m"
+    found = sweep.evaluate("four_bar", first, f"{path}, x_b, y_b, x_c, y_c, psi, omega_z", phi=ANGLES)
+    coupler = np.arctan2(found["y_c"] - found["y_b"], found["x_c"] - found["x_b"])
+    m = (first["xi"] + 1j * first["eta"]) / first["b"]
+    size, turned, arm = abs(m), m / abs(m), abs(m) * first["a"] / m
+    cognate = {"a": size * first["b"], "b": size * first["a"], "c": size * first["c"], "e": size * first["e"]}
+    cognate |= {"xi": arm.real, "eta": arm.imag, "phi": coupler, "branch": np.sign(np.sin(ANGLES - found["psi"]))}
+    second = sweep.evaluate("four_bar", cognate, path)
+    there, here = (np.asarray(table["x_m"] + 1j * table["y_m"]) for table in (second, found))
+    np.testing.assert_allclose(turned * there, here, atol=5e-14)
+    there, here = (np.asarray(table["dx_m"] + 1j * table["dy_m"]) for table in (second, found))
+    # The cognate's rates count per angle of its own crank; some of its poses are ten times worse conditioned.
+    np.testing.assert_allclose(turned * there * found["omega_z"].to_numpy(), here, atol=1e-12)
+
+
+def test_linkage_of_bennett_turns_as_its_closed_form() -> None:
+    """Bennett 1903: opposite links are equal, the sines of their twists go as their lengths.
+
+    Four hinges move it in space; its joints' points are those of a crank-rocker, one of whose assemblies it is.
+    tan(psi/2) is tan(phi/2) times a constant; both assemblies meet where the links are in line.
+    """
+    twist, long = np.radians(20.0), 1.8
+    other = np.arcsin(long * np.sin(twist))
+    table = {"a": 1.0, "b": long, "c": 1.0, "e": long, "f": 0.0, "g": 0.0, "alpha": other}
+    branch = np.sign(ANGLES - np.pi)
+    found = sweep.evaluate("rssr", table | {"phi": ANGLES, "branch": branch}, "psi, dpsi, d2psi")
+    k = np.cos((other - twist) / 2.0) / np.cos((other + twist) / 2.0)
+    x = np.tan(ANGLES / 2.0)
+    np.testing.assert_allclose(np.tan(found["psi"] / 2.0), k * x, rtol=1e-13)
+    rate = k * (1.0 + x**2) / (1.0 + (k * x) ** 2)
+    np.testing.assert_allclose(found["dpsi"], rate, rtol=1e-13)
+    np.testing.assert_allclose(found["d2psi"], rate * x * (1.0 - k**2) / (1.0 + (k * x) ** 2), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("key", "slowest", "fastest"), [(0.0, 1.0, 1.0), (90.0, None, None)])
+def test_two_joints_of_hooke_turn_evenly_if_their_forks_are_in_line(
+    key: float, slowest: float | None, fastest: float | None
+) -> None:
+    """Both at 25 deg; with the middle forks crossed the speed goes from cos^2 to 1/cos^2 of that angle."""
+    square = np.cos(np.radians(25.0)) ** 2
+    joint = {"a": 1.0, "b": np.sqrt(2.0), "c": 1.0, "e": 0.0, "f": 0.0, "g": 0.0, "alpha": np.radians(25.0)}
+    design = {f"{name}{stage}": value for name, value in joint.items() for stage in (1, 2)}
+    design["offset2"] = np.radians(key)
+    found = sweep.summarise("rssr+rssr", design, "min_dpsi, max_dpsi", accuracy=1e-10).iloc[0]
+    assert found["min_dpsi"] == pytest.approx(square if slowest is None else slowest, rel=1e-12)
+    assert found["max_dpsi"] == pytest.approx(1.0 / square if fastest is None else fastest, rel=1e-12)
+
+
+def test_wobble_drive_swings_as_its_closed_form() -> None:
+    """Spherical four-bar, a crank of 18 deg and three right angles: tan psi = -tan 18 deg cos phi on one assembly."""
+    slope = np.radians(18.0)
+    drive = {"a": np.sin(slope), "b": np.sqrt(2.0), "c": 1.0, "e": 0.0, "f": np.cos(slope), "g": 0.0}
+    drive["alpha"] = np.pi / 2.0
+    found = sweep.evaluate("rssr", drive, "psi", phi=ANGLES)["psi"]
+    np.testing.assert_allclose(np.abs(np.tan(found)), np.abs(np.tan(slope) * np.cos(ANGLES)), rtol=1e-13, atol=1e-15)
+    turn = sweep.summarise("rssr", drive, "swing, phi0, max_abs_dpsi, max_abs_d2psi, margin", accuracy=1e-10).iloc[0]
+    assert abs(turn["swing"]) == pytest.approx(2.0 * slope, rel=1e-14)
+    assert turn["phi0"] == pytest.approx(np.pi, rel=1e-14)
+    assert turn["max_abs_dpsi"] == pytest.approx(np.tan(slope), rel=1e-14)
+    # It is largest at the dead centres.
+    assert turn["max_abs_d2psi"] == pytest.approx(np.sin(2.0 * slope) / 2.0, rel=1e-14)
+    assert turn["margin"] == pytest.approx(np.cos(slope) ** 2 / 2.0, rel=1e-14)
