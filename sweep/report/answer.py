@@ -57,8 +57,7 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
     # A prescribed output is met by construction if [locus] fixes it, and part of the searched space if it is an axis.
     states = [s for s in tables.limit_states(data) if s.shown.name not in data.study.prescribed]
     sentences += _limit_sentences(states, data.optimum is not None and data.study.wanted_yield is not None)
-    sentences += _edge_sentence(data)
-    sentences += _sweep_sentences(data, scanned)
+    sentences += [_edge_sentence(data), _sweep_sentence(data, scanned)]
     front = Front.of(data)
     sentences.append(front.sentence() if front else "")
     sentences += _against_reference(data)
@@ -106,16 +105,12 @@ def _limit_sentences(states: list[tables.LimitState], robust: bool) -> list[str]
     ]
 
 
-def _edge_sentence(data: Dataset) -> list[str]:
-    """Return a sentence about parameters on the edge of the searched space."""
-    if data.study.objective is None:
-        return []
-    edges = [f"{row.name} ({row.edge}, {row.value})" for row in tables.parameter_rows(data) if row.edge]
-    return (
-        [f"On the edge of the space that was searched: {'; '.join(edges)}. A wider space may hold a better design."]
-        if edges
-        else []
-    )
+def _edge_sentence(data: Dataset) -> str:
+    """Return a sentence about parameters on the edge of the searched space; empty without one, or an objective."""
+    edges = "; ".join(f"{row.name} ({row.edge}, {row.value})" for row in tables.parameter_rows(data) if row.edge)
+    if not edges or data.study.objective is None:
+        return ""
+    return f"On the edge of the space that was searched: {edges}. A wider space may hold a better design."
 
 
 def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
@@ -191,16 +186,16 @@ def _against_reference(data: Dataset) -> list[str]:
     ]
 
 
-def _sweep_sentences(data: Dataset, scanned: Scan) -> list[str]:
+def _sweep_sentence(data: Dataset, scanned: Scan) -> str:
     feasible = scanned.feasible
     share = number(100.0 * feasible / max(data.designs, 1), 3)
     text = f"Of {_count(data.designs)} designs in the sweep {_count(feasible)} ({share} %) meet all limits"
     objective = data.objective
     if objective is None or data.optimum is None or not scanned.best_row:
-        return [text + "."]
+        return f"{text}."
     best = objective.show(scanned.best_row[objective.name])
     source = "" if data.survey is not None and data.survey.populations else ", from where the optimiser went on"
-    return [f"{text}; the best of them has {objective.symbol} = {best}{source}."]
+    return f"{text}; the best of them has {objective.symbol} = {best}{source}."
 
 
 def search_warnings(data: Dataset) -> list[str]:

@@ -64,11 +64,9 @@ class Dataset:
         """Return a column's display form."""
         form, family = quantity(name, self.units.get(name, "")), self.study.family
         asked = None if self.study.window is None else find(family, name)
-        return (
-            form
-            if asked is None or not is_windowed(family, asked)
-            else replace(form, words=f"{form.words} in the window")
-        )
+        if asked is not None and is_windowed(family, asked):
+            return replace(form, words=f"{form.words} in the window")
+        return form
 
     @property
     def objective(self) -> ShownQuantity | None:

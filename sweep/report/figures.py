@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import math
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -112,8 +111,8 @@ def map_figure(
 
     Marks outside the searched space are left out.
     """
-    from matplotlib.colors import LogNorm
-    from matplotlib.ticker import NullLocator
+    from matplotlib.colors import LogNorm, Normalize
+    from matplotlib.ticker import LogLocator
 
     figure = new_figure(WIDTH, 4.6, None)  # a constrained layout draws twice, a tenth of the report's time
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.98, wspace=0.08)
@@ -121,20 +120,23 @@ def map_figure(
     (x_cells, x_shown), (y_cells, y_shown) = x, y
     edges = x_cells.edges * x_shown.factor, y_cells.edges * y_shown.factor
     shares = grid.count / (designs * np.outer(y_cells.weights, x_cells.weights))
-    fields = [(np.where(grid.count > 0, 100.0 * np.minimum(shares, 1.0), np.nan), "Blues", "feasible designs [%]")]
+    share = np.where(grid.count > 0, 100.0 * np.minimum(shares, 1.0), np.nan)
+    fields = [(share, "Blues", Normalize(0.0), "feasible designs [%]")]
     if objective is not None:
         best = np.where(np.isfinite(grid.best), grid.best * objective.factor, np.nan)
-        fields.insert(0, (best, "viridis_r", f"best {objective.label} in the cell"))
-    for axes, (values, colours, label) in zip(panels, fields, strict=True):
+        # A few bad cells do not hide the differences between good ones: more than a decade has a logarithmic scale.
+        low, high = np.nanmin(best), np.nanmax(best)
+        norm = LogNorm() if 0.0 < 10.0 * low < high else Normalize()
+        fields.insert(0, (best, "viridis_r", norm, f"best {objective.label} in the cell"))
+    for axes, (values, colours, norm, label) in zip(panels, fields, strict=True):
         axes.set_facecolor("#eceef1")
         axes.grid(False)
-        norm = _norm(values) if colours == "viridis_r" else _share_norm(values)
         mesh = axes.pcolormesh(*edges, values, cmap=colours, norm=norm, rasterized=True)
         bar = figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.9, aspect=32, pad=0.04)
         if isinstance(norm, LogNorm):
-            bar.set_ticks(_round_between(float(norm.vmin or 0.0), float(norm.vmax or 0.0)))
-            bar.ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
-            bar.ax.xaxis.set_minor_locator(NullLocator())
+            bar.set_ticks(LogLocator(subs=(1.0, 2.0, 5.0)))
+            bar.ax.xaxis.set_major_formatter("{x:g}")
+            bar.minorticks_off()
         axes.set_xlabel(x_shown.label)
         limits = axes.get_xlim(), axes.get_ylim()
         for overlay in overlays:
@@ -255,50 +257,24 @@ def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y
             )
 
 
-def _norm(values: Array) -> object:
-    """Return a logarithmic scale if the values span more than a decade, otherwise a linear one.
-
-    A logarithmic scale keeps a few bad cells from hiding differences between good ones.
-    """
-    from matplotlib.colors import LogNorm, Normalize
-
-    finite = values[np.isfinite(values)]
-    if not finite.size:
-        return Normalize(0.0, 1.0)
-    low, high = float(finite.min()), float(finite.max())
-    if low > 0.0 and high > 10.0 * low:
-        return LogNorm(low, high)
-    return Normalize(low, high if high > low else low + 1.0)
-
-
-def _round_between(low: float, high: float) -> list[float]:
-    """Return the values 1, 2, 5, 10, ... between two bounds, at most eight."""
-    decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
-    ticks = [step * 10.0**k for k in decades for step in (1.0, 2.0, 5.0) if low <= step * 10.0**k <= high]
-    return ticks[:: max(1, -(-len(ticks) // 8))]
-
-
-def _share_norm(values: Array) -> object:
-    from matplotlib.colors import Normalize
-
-    return Normalize(0.0, float(np.nanmax(values)) if np.isfinite(values).any() else 100.0)
-
-
 def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
-    """Draw the best objective of each cell over one or two axes, by default the pair with the largest variation."""
+    """Draw the best objective of each cell over one or two axes, by default the pair with the largest variation.
+
+    A study without feasible designs has no map, and by default neither has one of which all designs are equally good.
+    """
     by_name = {c.name: c for c in cells}
     marks = {role: row for role, row in marked(data).items() if row is not None}
     objective = data.objective
-    if pair is None:
-        if objective is None and scanned.feasible == data.designs:
-            return None  # all of one colour
-        pair = most_telling(scanned)
+    alike = pair is None and objective is None and scanned.feasible == data.designs
+    if not scanned.feasible or alike:
+        return None
+    pair = pair or most_telling(scanned)
     if pair is not None:
         x, y = pair
         at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
         return map_figure(scanned.grids[pair], *sides, data.designs, objective, at, overlays(data.study, x, y))
-    if len(cells) == 1 and scanned.feasible:
+    if len(cells) == 1:
         name = cells[0].name
         side = cells[0], axis_quantity(data, name)
         return line_figure(

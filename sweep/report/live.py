@@ -47,13 +47,9 @@ def live(data: Dataset, cells: Sequence[Cells], different: Sequence[DistinctOpti
         "axis": "" if motion is None else motion["axis"],
         "sides": motion is not None and len({tuple(part["shift"]) for part in motion["designs"][0]["parts"]}) > 1,
         "lines_data": "" if lines is None else embedded(lines),
-        "lines_axes": [] if lines is None else [_head(axis) for axis in lines["axes"]],
+        "lines_axes": [] if lines is None else [axis["label"] for axis in lines["axes"]],
         "scripts": scripts_of(motion) if motion or lines else [],
     }
-
-
-def _head(axis: dict[str, str]) -> str:
-    return f"{axis['symbol']} [{axis['unit']}]" if axis["unit"] else axis["symbol"]
 
 
 def scripts_of(motion: Mapping[str, Any] | None) -> list[str]:
@@ -291,7 +287,7 @@ def parallel(data: Dataset, cells: Sequence[Cells], shown: Sequence[Shown]) -> d
     named = [item for item in shown if item.role != "front"]
     marks = [[float(item.row.get(axis.name, np.nan)) * axis.factor for axis in axes] for item in named]
     return {
-        "axes": [{"name": axis.name, "symbol": axis.symbol, "unit": axis.unit} for axis in axes],
+        "axes": [{"name": x.name, "symbol": x.symbol, "unit": x.unit, "label": x.label} for x in axes],
         "objective": next((k for k, axis in enumerate(axes) if objective and axis.name == objective.name), -1),
         "numbers": numbers.tolist(),
         "values": packed(values * [axis.factor for axis in axes]),

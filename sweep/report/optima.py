@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -24,10 +25,6 @@ from sweep.report.made import design_of, sampler
 from sweep.report.quantities import change, number, quantity
 from sweep.report.sketch import drawn_parts, sketch
 from sweep.report.tables import parameter_rows
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
-
 
 ALIKE = 0.1  # share of the mechanism's size, or of half a turn, below which designs count as the same
 SAME = 1e-6  # relative difference below which objectives are equal
@@ -155,27 +152,12 @@ SAMPLES = 2048  # mechanisms sampled per optimum: a share accurate to 1 %
 EXTRAS = ("least_link", "arm_ratio")
 
 
-@dataclass(frozen=True)
-class Optimum:
-    """One of the different optima, as a card shows it.
+def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[SimpleNamespace]:
+    """Return the cards of the first optima, with pictures to one scale; empty if there is only one.
 
     ``made`` is the yield of its manufactured mechanisms, in words; empty without tolerances.  ``sizes`` are the
     dimensions as name and value, ``extras`` outputs of the dimensions.
     """
-
-    title: str
-    objective: str
-    against: str
-    starts: int
-    mirrored: int
-    made: str
-    sizes: list[tuple[str, str]]
-    extras: list[tuple[str, str]]
-    picture: Markup | None
-
-
-def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[Optimum]:
-    """Return the cards of the first optima, with pictures to one scale; empty if there is only one."""
     objective, names = data.objective, data.study.bare.parameter_names
     tilts = {name for name in names if name.endswith("_tilt")}  # tilts of nominal designs are zero
     if len(distinct) < 2 or objective is None:
@@ -187,19 +169,19 @@ def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[Optimum]:
     cards = []
     for k, (group, placed) in enumerate(zip(distinct, drawn, strict=True)):
         value = float(group.row[objective.name])
-        lines = parameter_rows(data, group.row, 4)
+        shown = [x for x in parameter_rows(data, group.row, 4) if x.name in names]
         title = group.title(k)
         cards.append(
-            Optimum(
-                title,
-                f"{objective.words} {objective.show(value)}",
-                "" if k == 0 else change(objective, value, best),
-                group.starts,
-                group.mirrored,
-                _made(data, group.row),
-                [(x.name, x.value) for x in lines if x.name in names and (group.row[x.name] or x.name not in tilts)],
-                _extras(data, group.row),
-                sketch(placed, f"{title}: positions over one turn", names=False, span=span) if placed else None,
+            SimpleNamespace(
+                title=title,
+                objective=f"{objective.words} {objective.show(value)}",
+                against="" if k == 0 else change(objective, value, best),
+                starts=group.starts,
+                mirrored=group.mirrored,
+                made=_made(data, group.row),
+                sizes=[(x.name, x.value) for x in shown if group.row[x.name] or x.name not in tilts],
+                extras=_extras(data, group.row),
+                picture=sketch(placed, f"{title}: positions over one turn", names=False, span=span) if placed else None,
             )
         )
     return cards

@@ -18,7 +18,7 @@ from sweep.dataset.reading import non_dominated
 from sweep.families.base import Array
 from sweep.families.names import is_error, without_error
 from sweep.quantities.limits import compared
-from sweep.study import Study
+from sweep.study import Axis, Study
 
 SCATTER_POINTS = 40_000
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32
@@ -43,13 +43,8 @@ class Cells:
         if ordered.size == 1:
             reach = 0.5 * abs(ordered[0]) or 0.5
             return cls(name, np.array([ordered[0] - reach, ordered[0] + reach]), np.ones(1))
-        boundaries = np.concatenate(
-            [
-                [1.5 * ordered[0] - 0.5 * ordered[1]],
-                0.5 * (ordered[1:] + ordered[:-1]),
-                [1.5 * ordered[-1] - 0.5 * ordered[-2]],
-            ]
-        )
+        continued = np.pad(ordered, 1, mode="reflect", reflect_type="odd")
+        boundaries = 0.5 * (continued[1:] + continued[:-1])
         count = min(most, ordered.size)
         starts = np.arange(count + 1) * ordered.size // count
         return cls(name, boundaries[starts], np.diff(starts) / ordered.size)
@@ -109,16 +104,15 @@ def divided_axes(study: Study, feasible: int) -> list[Cells]:
     left_out = signs.union(study.made, study.rescaled)
     swept = [axis for axis in study.space.axes if axis.varies and axis.name not in left_out]
     most = CELLS_OF_PAIR if len(swept) <= 2 else CELLS_OF_MANY
-    if study.space.kind == "sobol":
-        # A power of two: a Sobol sequence puts equally many points into each cell.
-        sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
-        return [
-            Cells.of_range(axis.name, axis.low, axis.high, sampled)
-            if axis.values is None
-            else Cells.of_values(axis.name, axis.values, most)
-            for axis in swept
-        ]
-    return [Cells.of_values(axis.name, axis.values, most) for axis in swept if axis.values is not None]
+    # A power of two: a Sobol sequence puts equally many points into each cell.
+    sampled = 2 ** min(5, max(2, math.floor(0.5 * math.log2(max(feasible, 1) / DESIGNS_PER_CELL))))
+
+    def divided(axis: Axis) -> Cells:
+        if axis.values is None:
+            return Cells.of_range(axis.name, axis.low, axis.high, sampled)
+        return Cells.of_values(axis.name, axis.values, most)
+
+    return [divided(axis) for axis in swept]
 
 
 def scan(

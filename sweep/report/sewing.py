@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,32 +32,17 @@ ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the ro
 
 
 @dataclass(frozen=True)
-class SpeedRow:
-    """One speed: the window of the rise, the end of it that binds the optimum, and shares of mechanisms.
-
-    ``shares`` are those of manufactured mechanisms that keep each moment, then the least and the most rise;
-    ``interval`` is the 95 % confidence interval of the share ``every`` that keeps all moments.
-    """
-
-    speed: str
-    window: str
-    binds: str
-    shares: tuple[str, ...]
-    every: str
-    interval: str
-
-
-@dataclass(frozen=True)
 class Sewn:
     """Shares of manufactured mechanisms by speed: rows of the stated speeds, curves between them; the answer in words.
 
     ``shares`` (S,) keep all moments, with 95 % confidence between ``low`` and ``high``; ``ends`` are the shares that
-    keep the least and the most permitted rise.
+    keep the least and the most permitted rise.  A row has the window of the rise, the end of it that binds the optimum,
+    ``shares`` that keep each moment, then the least and the most rise, and ``every`` with its ``interval`` for all.
     """
 
     sentence: str
     moments: tuple[str, ...]
-    rows: tuple[SpeedRow, ...]
+    rows: tuple[SimpleNamespace, ...]
     count: int
     speeds: Array
     shares: Array
@@ -87,13 +73,13 @@ def sewn(data: Dataset) -> Sewn | None:
     moments = tuple(name for name in meets if name not in ends)
     meets_all = np.logical_and.reduce(list(meets.values()))
     rows = tuple(
-        SpeedRow(
-            f"{stated[k] / RPM:.6g}",
-            f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
-            _binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),
-            tuple(_percent(float(meets[name][:, at].mean())) for name in (*moments, *ends)),
-            _percent(float(meets_all[:, at].mean())),
-            " to ".join(map(_percent, _interval(meets_all[:, at]))),
+        SimpleNamespace(
+            speed=f"{stated[k] / RPM:.6g}",
+            window=f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
+            binds=_binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),
+            shares=[_percent(float(meets[name][:, at].mean())) for name in (*moments, *ends)],
+            every=_percent(float(meets_all[:, at].mean())),
+            interval=" to ".join(map(_percent, _interval(meets_all[:, at]))),
         )
         for k, at in enumerate(np.searchsorted(speeds, stated).tolist())
     )
