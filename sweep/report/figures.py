@@ -134,7 +134,7 @@ def map_figure(
         mesh = axes.pcolormesh(*edges, values, cmap=colours, norm=norm, rasterized=True)
         bar = figure.colorbar(mesh, ax=axes, label=label, location="top", shrink=0.9, aspect=32, pad=0.04)
         if isinstance(norm, LogNorm):
-            bar.set_ticks(LogLocator(subs=(1.0, 2.0, 5.0)))
+            bar.set_ticks(LogLocator(subs=(1.0, 3.0)))
             bar.ax.xaxis.set_major_formatter("{x:g}")
             bar.minorticks_off()
         axes.set_xlabel(x_shown.label)
