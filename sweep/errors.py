@@ -22,6 +22,17 @@ class LinksweepError(Exception):
 
     exit_code = 2
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Python would call __init__ with the message, which takes other arguments in many of these classes.
+        return _copied, (type(self), self.args, vars(self))
+
+
+def _copied(kind: type[LinksweepError], message: tuple[object, ...], attributes: dict[str, Any]) -> LinksweepError:
+    """Return an error that a worker process has raised."""
+    error = kind.__new__(kind, *message)
+    vars(error).update(attributes)
+    return error
+
 
 class InputError(LinksweepError, ValueError):
     """A table, a name or a number handed to the API is wrong.
@@ -38,9 +49,6 @@ class InputError(LinksweepError, ValueError):
         self.name, self.value, self.allowed, self.place = name, value, allowed, place
         super().__init__(f"{place}: {name} = {shown(value)}; allowed: {allowed}")
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[Any, ...]]:
-        return type(self), (self.name, self.value, self.allowed, self.place)
-
 
 class MissingInput(InputError):
     """A required column, point or other input was not given.
@@ -55,9 +63,6 @@ class MissingInput(InputError):
     def __init__(self, name: str, needed: str, place: str) -> None:
         super().__init__(name, None, needed, place)
         self.args = (f"{place}: {name} is missing; needed: {needed}",)
-
-    def __reduce__(self) -> tuple[type[MissingInput], tuple[str, str, str]]:
-        return type(self), (self.name, self.allowed, self.place)
 
 
 def shown(value: object) -> str:
@@ -101,9 +106,6 @@ class StudyError(LinksweepError, ValueError):
         more = [f"  and {count - MOST_FAULTS} more; mend these first"] if count > MOST_FAULTS else []
         super().__init__("\n".join([*lines, *more]))
 
-    def __reduce__(self) -> tuple[type[StudyError], tuple[str, list[str]]]:
-        return type(self), (self.path, self.faults)
-
 
 class BudgetError(LinksweepError):
     """A study would cost more time or disk than its budget allows; it can be forced."""
@@ -144,9 +146,6 @@ class ProgramFault(LinksweepError):
         self.trace = trace
         super().__init__(message)
 
-    def __reduce__(self) -> tuple[type[ProgramFault], tuple[str, str]]:
-        return type(self), (str(self), self.trace)
-
 
 class TimeUsedUp(LinksweepError):
     """The time that the study allows is over; finished chunks are kept and the next run continues."""
@@ -167,9 +166,6 @@ class SearchCutShort(TimeUsedUp):
         self.folder = folder
         super().__init__(message)
 
-    def __reduce__(self) -> tuple[type[SearchCutShort], tuple[Path, str]]:
-        return type(self), (self.folder, str(self))
-
 
 class Interrupted(LinksweepError):
     """A signal stopped the run; finished chunks are kept and the next run continues with the missing ones."""
@@ -178,9 +174,6 @@ class Interrupted(LinksweepError):
         self.signal_number = signal_number
         super().__init__(message)
         self.exit_code = 128 + signal_number
-
-    def __reduce__(self) -> tuple[type[Interrupted], tuple[int, str]]:
-        return type(self), (self.signal_number, str(self))
 
 
 class LinksweepWarning(UserWarning):

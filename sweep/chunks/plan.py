@@ -290,11 +290,8 @@ def describe_columns(study: Study) -> tuple[Column, ...]:
 
 def error_words(study: Study, name: str) -> str:
     """Definition of an output's error column: proven bound or estimate."""
-    return (
-        "proven bound of the absolute error"
-        if is_proven(study.family, name, study.accuracy)
-        else "absolute error estimate"
-    )
+    proven = is_proven(study.family, name, study.accuracy)
+    return "proven bound of the absolute error" if proven else "absolute error estimate"
 
 
 def _output_column(study: Study, name: str, dtype: str) -> Column:

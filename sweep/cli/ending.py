@@ -111,15 +111,12 @@ def _optimum(data: Dataset) -> list[str]:
     ends = ", ".join(f"{name} = {limited(data, name).show(float(data.optimum[name]))}" for name in follow)
     share = float(data.optimum.get("yield", math.nan))
     ended, agree = str(data.optimum.get("ended")), int(data.optimum.get("agree", 1))
+    kept = share_words(share, data.study.wanted_yield, ended, agree) if math.isfinite(share) else ""
     return [
         f"optimum: {objective.words} {objective.show(value)}{f' ({fast})' if fast else ''}",
         f"held back by: {held_back(held, ended, settled=not unsettled(data.optimum))}",
         *([f"bounds that follow from the designs of the sweep: {ends}; {WIDER}"] if ends else []),
-        *(
-            [f"as it is made: {share_words(share, data.study.wanted_yield, ended, agree)}"]
-            if math.isfinite(share)
-            else []
-        ),
+        *([f"as it is made: {kept}"] if kept else []),
         *(f"warning: {words}" for words in (*unsettled(data.optimum), *shortest_link(data))),
     ]
 

@@ -117,12 +117,9 @@ class Verbs(click.Group):
                 ctx.exit(errors.WorkerDied.exit_code)
             if not isinstance(error, OSError) or error.errno == errno.EPIPE:  # click handles a closed pipe
                 raise
-            gone = isinstance(error, FileNotFoundError) and not _is_here()
-            words = (
-                "the folder it was started in is not there any more; go to another one"
-                if gone
-                else errors.reason(error)
-            )
+            words = errors.reason(error)
+            if isinstance(error, FileNotFoundError) and not _is_here():
+                words = "the folder it was started in is not there any more; go to another one"
             _last_words(f"sweep: {words}")
             ctx.exit(errors.StoreError.exit_code)
 

@@ -80,12 +80,9 @@ class Verification:
         """Describe the findings in words, one per line; the last line is the verdict."""
         words = [f"{how_many(self.chunks, 'whole chunk')}, {how_many(self.rows, 'row')}, {self.size} bytes read"]
         words += [f"{how_many(self.recomputed, 'design')} computed again"] if self.recomputed else []
-        damaged = sum(finding.damage for finding in self.findings)
-        verdict = (
-            f"{damaged} damaged or lost, {len(self.findings) - damaged} not computed yet"
-            if self.findings
-            else "complete and undamaged"
-        )
+        damaged, verdict = sum(finding.damage for finding in self.findings), "complete and undamaged"
+        if self.findings:
+            verdict = f"{damaged} damaged or lost, {len(self.findings) - damaged} not computed yet"
         words += [*self.notes, *map(str, self.findings), f"{self.folder}: {verdict}"]
         # File names may contain any bytes; undecodable ones are written as escapes.
         return [line.encode("utf-8", "backslashreplace").decode() for line in words]

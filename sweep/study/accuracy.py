@@ -2,21 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-from pydantic import PlainValidator
+from typing import Any
 
 from sweep.errors import InputError
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Family
 from sweep.reductions.steps import check_certifiable, proofs
-from sweep.study.file import Faults, Section, holds
-
-
-def _proofs(value: object) -> object:
-    # A union type would make pydantic report one error for each member of the union.
-    if isinstance(value, bool) or (isinstance(value, list) and all(isinstance(name, str) for name in value)):
-        return value
-    raise ValueError("neither a truth value nor names")
+from sweep.study.file import Faults, Section, TruthOrNames, holds
 
 
 class AccuracySection(Section):
@@ -24,9 +15,7 @@ class AccuracySection(Section):
 
     target: float | None = holds("a relative error, 1e-14 to 0.1", ge=1e-14, le=0.1)
     samples: int | None = holds("a whole number of crank angles, 8 to 1048576", ge=8, le=2**20)
-    certify: Annotated[bool | list[str], PlainValidator(_proofs, json_schema_input_type=bool | list[str])] = holds(
-        "true or false, or a list of the wanted maxima to prove", False
-    )
+    certify: TruthOrNames = holds("true or false, or a list of the wanted maxima to prove", False)
 
 
 def read_accuracy(section: AccuracySection, faults: Faults) -> Accuracy:

@@ -223,6 +223,7 @@ KIND = Discriminator(
 Place = Annotated[Annotated[str, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
 LengthOrPlace = Annotated[Annotated[Length, Tag(ONE)] | Annotated[ThreeLengths, Tag(LIST)], KIND]
 Lengths = Annotated[Annotated[Length, Tag(ONE)] | Annotated[list[Length], Tag(LIST)], KIND]
+TruthOrNames = Annotated[Annotated[bool, Tag(ONE)] | Annotated[list[str], Tag(LIST)], KIND]
 TextOrNumber = Annotated[
     Annotated[str, Tag(WORD)] | Annotated[Number, Tag(ONE)],
     Discriminator(lambda value: WORD if isinstance(value, str) else ONE),

@@ -33,20 +33,17 @@ def settings() -> Mapping[str, Mapping[str, Any]]:
 def limits_of_settings(file: StudyFile) -> list[Limit]:
     """Return the limits of every relation that names a machine's settings, and report unknown names."""
     limits = []
-    relations = file.data.get("relations")
-    for relation, table in relations.items() if isinstance(relations, dict) else ():
-        if not isinstance(table, dict) or "settings" not in table:
-            continue
+    relations = file.data.get("relations", {}) if "machine" in file else {}
+    for relation, table in relations.items():
         key: Key = ("relations", relation, "settings")
-        name = table["settings"]
-        if "take" not in table:
+        name = table.get("settings")
+        if name is not None and "take" not in table:
             file.faults.value(key, name, "nothing here: settings are limits of a relation take")
-            continue
-        setting = settings().get(name) if isinstance(name, str) else None
-        if setting is None:
-            file.faults.value(key, name, choices(str(name), settings()))
-            continue
-        limits += [Limit(f"{relation}_{what}", *ends) for what, ends in setting.items() if what != "source"]
+        elif name is not None and name not in settings():
+            file.faults.value(key, name, choices(name, settings()))
+        elif name is not None:
+            ends_of = {what: ends for what, ends in settings()[name].items() if what != "source"}
+            limits += [Limit(f"{relation}_{what}", *ends) for what, ends in ends_of.items()]
     return limits
 
 
@@ -164,12 +161,8 @@ def _read_text(output: Output, text: str, key: Key, faults: Faults) -> list[Limi
         return []
     faults.within_turn(key, max(abs(centre), abs(number)), unit)
     if not (math.isfinite(centre) and math.isfinite(number * factor) and (number > 0.0 or not band)):
-        allowed = (
-            f"a finite value and a positive band, as {_band(internal)}"
-            if band
-            else f"a finite number, as {_side(internal)}"
-        )
-        faults.value(key, text, allowed)
+        form = f"value and a positive band, as {_band(internal)}" if band else f"number, as {_side(internal)}"
+        faults.value(key, text, f"a finite {form}")
         return []
     if band:
         return [Limit(output.name, (centre - number) * factor, (centre + number) * factor)]

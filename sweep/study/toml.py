@@ -53,9 +53,9 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise _fault(file, f"line {line}: a number of thousands of digits; allowed: numbers up to 1e100") from None
     except RecursionError:
         raise _fault(file, f"tables or lists within each other too often; allowed: {DEEPEST} levels") from None
-    key = _too_deep(data)
-    if key is not None:
-        raise _fault(file, f"{key}: tables or lists within each other too often; allowed: {DEEPEST} levels")
+    for key, value in data.items():
+        if _is_deeper(value, DEEPEST):
+            raise _fault(file, f"{key}: tables or lists within each other too often; allowed: {DEEPEST} levels")
     return data
 
 
@@ -126,21 +126,10 @@ def _heading(lines: list[str]) -> str:
     return headings[-1] if headings else ""
 
 
-def _too_deep(data: dict[str, Any]) -> str | None:
-    """Return the first key under which tables and lists are nested too deeply, or None."""
-    for key, value in data.items():
-        level = [value]
-        for _ in range(DEEPEST):
-            level = [
-                inner
-                for outer in level
-                if isinstance(outer, (dict, list))
-                for inner in (outer.values() if isinstance(outer, dict) else outer)
-                if isinstance(inner, (dict, list))
-            ]
-        if level:
-            return key
-    return None
+def _is_deeper(value: object, levels: int) -> bool:
+    """Tell whether tables and lists are nested in more levels than these."""
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list) else None
+    return inner is not None and (levels == 0 or any(_is_deeper(one, levels - 1) for one in inner))
 
 
 def key_lines(text: str) -> dict[str, int]:
