@@ -19,7 +19,7 @@ from sweep.effects.scene import Scene
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
 from sweep.evaluation.poses import evaluate
-from sweep.exchange.scene import PlacedPart, extent
+from sweep.exchange.scene import PlacedPart, extent, shown_name
 from sweep.families import names
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
@@ -43,6 +43,7 @@ class Loop:
     crank, coupler, driven : axes of the bodies, (3, 3); x along the link, z along its axis
     finger : DRIVING or not
     turn : rotation from the frame of the family's forces and gravity to that of its joints
+    shift : displacement of the stage beside others
     """
 
     tag: str
@@ -56,6 +57,7 @@ class Loop:
     driven: Array
     finger: float
     turn: Array
+    shift: Array
 
 
 def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, float], path: Path, unit: str) -> None:
@@ -151,7 +153,7 @@ def _loop(placed: PlacedPart, finger: float, metres: float) -> Loop:
     coupler, driven = np.column_stack([s, np.cross(n, s), n]), np.column_stack([rho, tau, k])
     return Loop(
         _tag(part), records.follower, a, b, c, d,
-        turn @ crank, turn @ coupler, turn @ driven, finger, turn,
+        turn @ crank, turn @ coupler, turn @ driven, finger, turn, placed.shift * metres,
     )  # fmt: skip
 
 
@@ -203,8 +205,15 @@ def _stage(
             body, "geom", name=f"{name}{tag}", type="capsule", size=repr(thick), density="7850", contype="0",
             conaffinity="0", fromto=words(np.array([0.0, 0.0, 0.0, lengths[name], 0.0, 0.0])),
         )  # fmt: skip
-    for body, site, x in ((crank, "A", 0.0), (crank, "B", a), (coupler, "C", b), (driven, "D", 0.0)):
-        Xml.SubElement(body, "site", name=f"{site}{tag}", pos=words(np.array([x, 0.0, 0.0])))
+    frames = {
+        "crank": (crank, loop.A, loop.crank), "coupler": (coupler, loop.B, loop.coupler),
+        follower: (driven, loop.D, loop.driven),
+    }  # fmt: skip
+    for joint, path in part.joints.items():
+        link = next((link.name for link in part.links if joint in link.joints), "")
+        body, origin, axes = frames.get(link, (world, np.zeros(3), np.eye(3)))
+        at = axes.T @ (path[0] * METRES[unit] + loop.shift - origin)
+        Xml.SubElement(body, "site", name=f"{shown_name(joint)}{tag}", pos=words(at))
 
 
 def _body(parent: Xml.Element, name: str, at: Array, frame: Array) -> Xml.Element:
