@@ -24,6 +24,7 @@ from sweep.families import names
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
 from sweep.families.machines.machine import Machine
+from sweep.families.sites import TIP
 
 METRES = {"mm": 1e-3, "m": 1.0}
 LEAST = "2e-15"  # kg, kg m^2: MuJoCo refuses 1e-15 or less, as bars of a mechanism below some 10 mm have
@@ -210,7 +211,8 @@ def _stage(
         follower: (driven, loop.D, loop.driven),
     }  # fmt: skip
     for joint, path in part.joints.items():
-        link = next((link.name for link in part.links if joint in link.joints), "")
+        links = (link.name for link in part.links if joint in link.joints)
+        link = next(links, follower if joint == TIP else "")
         body, origin, axes = frames.get(link, (world, np.zeros(3), np.eye(3)))
         at = axes.T @ (path[0] * METRES[unit] + loop.shift - origin)
         Xml.SubElement(body, "site", name=f"{shown_name(joint)}{tag}", pos=words(at))

@@ -224,7 +224,7 @@ def test_mujoco_moves_the_members_of_a_machine_together(tmp_path):
     machine = sweep.machine(
         {
             "needle": ["rssr", "guide"],
-            "looper": {"family": "rssr", "ratio": -2, "offset": 0.4, "place": place},
+            "looper": {"family": "rssr", "ratio": -2, "offset": 0.4, "place": place, "tip": [30.0, 2.0, 1.0]},
             "feed": {"family": "four_bar", "driver": "needle.psi1", "ratio": 1},
         }
     )
@@ -241,9 +241,9 @@ def test_mujoco_moves_the_members_of_a_machine_together(tmp_path):
         solved(model, data, phi, "crank needle 1")
         for part in parts(machine, design, phi):
             if part.member != "needle":  # the stages of the needle stand side by side
-                for joint in "bc":
-                    at = 1000.0 * data.site(f"{joint.upper()} {part.member}").xpos
-                    np.testing.assert_allclose(at, part.joints[joint][0] + shift_of(part, machine, design), atol=1e-9)
+                for joint, path in part.joints.items():
+                    at = 1000.0 * data.site(f"{shown_name(joint)} {part.member}").xpos
+                    np.testing.assert_allclose(at, path[0] + shift_of(part, machine, design), atol=1e-9)
 
 
 def shift_of(part, machine, design):
