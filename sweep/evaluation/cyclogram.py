@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
 CyclogramRow = tuple[str, str, str, float, float, float]
 AWAY = {PLATE: ("dwell", "low", 0.0), FLIGHT: ("flight", "flies", float("nan"))}  # states of a foot off the rack
+LEVEL = 1e-9  # share of the largest stroke below which a difference of heights is rounding
 FLIGHT_ENDS = ("loss", "land")  # of a presser foot's first flight
 COLUMNS = ("member", "kind", "name", "start", "end", "size")
 UNITS = {"start": "rad", "end": "rad", "size": "length, or rad of a follower that turns"}
@@ -107,17 +108,24 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     if wraps:  # shifted by full turns to the unwrapped samples
         grid = np.arange(SAMPLES + 1) * TWO_PI / SAMPLES
         exact = exact + TWO_PI * np.round((np.interp(extrema, grid, np.append(path, path[0])) - exact) / TWO_PI)
+    most = float(np.ptp(exact))
     for k, size in enumerate(np.roll(exact, -1) - exact):
+        if abs(size) <= LEVEL * most:  # from one end of a piece to the other along which a cam stands still
+            continue
         yield member, "stroke", "rises" if size > 0.0 else "falls", extrema[k], extrema[(k + 1) % extrema.size], size
-    band = dwell * float(np.ptp(exact))
-    for word, k in (("low", int(exact.argmin())), ("high", int(exact.argmax()))):
+    band = dwell * most
+    for word, level in (("low", float(exact.min())), ("high", float(exact.max()))):
 
-        def beyond_band(phi: float, level: float = exact[k]) -> float:
+        def beyond_band(phi: float, level: float = level) -> float:
             offset = poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0][0] - level
             return float(abs(offset - TWO_PI * round(offset / TWO_PI) if wraps else offset)) - band
 
-        start, end = (_band_end(beyond_band, float(extrema[k]), way) for way in (-1.0, 1.0))
-        yield member, "dwell", word, start % TWO_PI, end % TWO_PI, band
+        found: list[tuple[float, float]] = []
+        for phi in extrema[np.abs(exact - level) <= LEVEL * most]:  # a geared member is there several times a turn
+            if all((phi - start) % TWO_PI > end - start for start, end in found):
+                found.append((_band_end(beyond_band, float(phi), -1.0), _band_end(beyond_band, float(phi), 1.0)))
+        for start, end in found:
+            yield member, "dwell", word, start % TWO_PI, end % TWO_PI, band
 
 
 def _band_end(beyond_band: Callable[[float], float], phi: float, direction: float) -> float:

@@ -38,6 +38,28 @@ def test_strokes_and_dwells_of_a_slider_crank_are_those_of_its_closed_form():
         assert dwells.loc[name, ["start", "end"]].to_list() == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.parametrize("ratio", [1, -2])
+@pytest.mark.parametrize("name", ["cam", "cam_lever"])
+def test_strokes_of_a_cam_begin_and_end_where_its_follower_moves(name, ratio):
+    """They lasted through the dwells: from the end of one stroke to the end of the next."""
+    law = {"lift": 0.4, "rise": 1.3, "dwell": 1.1, "fall": 1.7, "start": 0.3, "law": 2.0, "r0": 3.0, "e": 0.4}
+    law |= {"c": 5.0, "e": 6.0, "branch": -1.0} if name == "cam_lever" else {}
+    machine = sweep.machine({"x": {"family": name, "ratio": ratio, "offset": 0.7}}, {})
+    rows = sweep.cyclogram(machine, {f"x.{key}": value for key, value in law.items()})
+    for word, begins, ends in (("rises", 0.3, 1.6), ("falls", 2.7, 4.4)):
+        span = (begins, ends) if ratio > 0 else (ends, begins)
+        word = word if ratio > 0 else {"rises": "falls", "falls": "rises"}[word]
+        strokes = rows[(rows["kind"] == "stroke") & (rows["name"] == word)]
+        assert len(strokes) == abs(ratio)
+        for k, edge in enumerate(("start", "end")):
+            expected = np.sort(np.mod((span[k] - 0.7 + 2.0 * np.pi * np.arange(abs(ratio))) / ratio, 2.0 * np.pi))
+            # near its ends the law moves by the cube of the angle at least: below 1e-5 rad that is rounding
+            np.testing.assert_allclose(np.sort(strokes[edge]), expected, rtol=0.0, atol=1e-5)
+        np.testing.assert_allclose(strokes["size"], 0.4 if word == "rises" else -0.4, rtol=1e-9)
+    dwells = rows[rows["kind"] == "dwell"]
+    assert dwells["name"].value_counts().to_dict() == {"low": abs(ratio), "high": abs(ratio)}
+
+
 def test_machine_lists_its_moments_and_all_its_members():
     rows = sweep.cyclogram(machine_of(), DESIGN)
     assert set(rows["member"]) == {"", "needle", "looper"}

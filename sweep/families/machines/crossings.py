@@ -171,11 +171,21 @@ class Poses:
         return np.maximum.reduce([status for status, _ in kept]), [values for _, values in kept]
 
     def turning(self, rate: str, slope: Array) -> CrankAngles:
-        """Find where samples (n, m) of a derivative change their sign, refined to its roots."""
-        after = np.roll(slope, -1, axis=1)
-        row, column = np.nonzero((slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0))
-        step = TWO_PI / slope.shape[1]
-        return CrankAngles(row, self._root(row, column * step, (column + 1) * step, rate, slope))
+        """Find where samples (n, m) of a derivative change their sign, refined to its roots.
+
+        Where a cam stands still the derivative is exactly zero: both ends of such a piece are found.
+        """
+        after, step = np.roll(slope, -1, axis=1), TWO_PI / slope.shape[1]
+        still = (slope == 0.0) & ((after == 0.0) | (np.roll(slope, 1, axis=1) == 0.0))
+        ends = still != np.roll(still, -1, axis=1)
+        passes = (slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0)
+        row, column = np.nonzero(passes | ends)
+        left, right, end = column * step, (column + 1) * step, ends[row, column]
+        phi = np.empty(row.size)
+        phi[~end] = self._root(row[~end], left[~end], right[~end], rate, slope)
+        rows = row[end]
+        phi[end] = zeros(lambda k, x: np.where(self.near(rows[k], x, rate) == 0.0, -1.0, 1.0), left[end], right[end])
+        return CrankAngles(row, phi)
 
     def roots(self, extremes: CrankAngles, at_extremes: Array, name: str, rate: str, values: Array) -> CrankAngles:
         """Find the zeros of an output, of each design in order, between neighbours of opposite sign.
