@@ -258,8 +258,14 @@ def _begins(word: str, name: str) -> bool:
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """Return ``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string."""
-    guess = closest(word, known)
+    """Return ``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string.
+
+    A name without its member, such as ``speed`` in a machine, means that of every member.
+    """
+    names = list(known)
+    if len(members := [name for name in names if name.endswith(f".{word}")]) > 1:
+        return f", did you mean {listed(members)}?"
+    guess = closest(word, names)
     return f", did you mean '{guess}'?" if guess else ""
 
 

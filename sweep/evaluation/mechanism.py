@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from kernels.types import TWO_PI, Array
 from sweep.effects import inputs_beside
-from sweep.errors import InputError, MissingInput, nearest
+from sweep.errors import InputError, MissingInput, listed, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
 from sweep.evaluation.poses import check_march, query_of, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
@@ -162,7 +162,7 @@ def _in_internal_units(family: Family, dimensions: Mapping[str, Number]) -> dict
     inputs = dict(inputs_beside(family, dimensions)) | {p.name: p for p in family.parameters}
     for name in dimensions:
         if name not in inputs:
-            allowed = f"{', '.join(family.parameter_names)}{nearest(name, inputs)}"
+            allowed = f"{listed(family.parameter_names)}{nearest(name, inputs)}"
             raise InputError("dimension", name, allowed, _place(family))
     return {name: _value(name, inputs[name], value, _place(family)) for name, value in dimensions.items()}
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
-from sweep.errors import InputError, MissingInput, choices, nearest
+from sweep.errors import InputError, MissingInput, choices, listed, nearest
 from sweep.families.base import Array, Parameter
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def design_matrix(
         if name not in names and name not in unused:
             guess = nearest(name, [k for k in names if k not in keys])
             if guess:
-                raise InputError("column", name, f"the columns {', '.join(names)}{guess}", "table")
+                raise InputError("column", name, f"the columns {listed(names)}{guess}", "table")
     columns = {name: numbers(table[key], name, f"column {name}, row") for name, key in keys.items() if name in names}
     unread = {name: np.asarray(table[key]) for name, key in keys.items() if name in unused and name not in columns}
     rows = _row_count(columns | unread)

@@ -210,3 +210,27 @@ def test_a_turning_load_as_large_as_a_fixed_one_has_the_mean_of_the_catalogues()
     found = sweep.summarise("slotted", design, "mean_load_a1", accuracy=1e-9)["mean_load_a1"]
     assert found[0] / 20.0 == pytest.approx((4.0 / (3.0 * np.pi)) ** (1.0 / 3.0), rel=1e-9)
     assert round(found[0] / 20.0, 2) == 0.75
+
+
+@pytest.mark.parametrize(
+    ("cranks", "left"), [((0.0, 180.0, 180.0, 0.0), (2, 4, 6)), ((0.0, 120.0, 240.0, 240.0, 120.0, 0.0), (6,))]
+)
+def test_engine_in_line_shakes_in_the_orders_of_den_hartog(cranks: tuple[float, ...], left: tuple[int, ...]) -> None:
+    """Mechanical Vibrations, chapter 5: pistons alone, crank 40, rod 160, 120 apart; the orders that do not cancel."""
+    members = {
+        f"c{k}": {"family": "slider_crank", "offset": np.radians(angle), "place": {"at": [0.0, 0.0, 120.0 * k]}}
+        for k, angle in enumerate(cranks)
+    }
+    one = {"a": 40.0, "b": 160.0, "m_crank": 0.0, "m_coupler": 0.0, "m_slider": 5e-4, "speed": 300.0}
+    design = {f"{member}.{name}": value for member in members for name, value in one.items()}
+    engine = sweep.machine(members, {"shaking": {"shaking": list(members)}})
+    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    found = sweep.evaluate(engine, design, "shaking_x, shaking_moment_y", phi=angles)
+    unit, x = 5e-4 * 40.0 * 300.0**2, 40.0 / 160.0
+    series = {2: x + x**3 / 4.0 + 15.0 * x**5 / 128.0, 4: x**3 / 4.0 + 3.0 * x**5 / 16.0, 6: 9.0 * x**5 / 128.0}
+    orders = 2.0 * np.abs(np.fft.rfft(found["shaking_x"])) / 64.0 / unit / len(cranks)
+    expected = [series[k] if k in left else 0.0 for k in range(1, 8)]
+    np.testing.assert_allclose(orders[1:8], expected, atol=0.2 * x**7)  # the first terms that he leaves out
+    # Mirrored cranks: the couple about the middle is nothing, so the moment is the force at the middle.
+    middle = 120.0 * (len(cranks) - 1) / 2.0
+    np.testing.assert_allclose(found["shaking_moment_y"], middle * found["shaking_x"], atol=1e-9)

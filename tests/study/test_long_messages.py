@@ -52,6 +52,13 @@ def test_of_a_long_list_the_first_names_and_the_nearest_are_told() -> None:
     assert choices("outpt44", names) == f"{', '.join(names[:MOST_NAMES])} and 5 more, did you mean 'output44'?"
 
 
+def test_a_name_without_its_member_means_that_of_every_member() -> None:
+    engine = sweep.machine({f"c{k}": "slider_crank" for k in (1, 2, 3)}, {"shaking": {"shaking": ["c1", "c2", "c3"]}})
+    with pytest.raises(InputError, match=r"more, did you mean c1\.speed, c2\.speed, c3\.speed\?$") as caught:
+        sweep.evaluate(engine, {"speed": 300.0}, "shaking", phi=0.0)
+    assert str(caught.value).count(",") < MOST_NAMES + 5
+
+
 def test_a_hexadecimal_number_of_thousands_of_digits_is_a_fault(tmp_path: Path) -> None:
     (message,) = faults_of(RIGHT.replace("starts = 10", f"starts = 0x{'f' * 4500}"), tmp_path)
     assert "optimise.starts = something of type int that cannot be printed; allowed: a whole number" in message
