@@ -234,3 +234,20 @@ def test_engine_in_line_shakes_in_the_orders_of_den_hartog(cranks: tuple[float, 
     # Mirrored cranks: the couple about the middle is nothing, so the moment is the force at the middle.
     middle = 120.0 * (len(cranks) - 1) / 2.0
     np.testing.assert_allclose(found["shaking_moment_y"], middle * found["shaking_x"], atol=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.9, 1.0, 1.5, 3.0])
+@pytest.mark.parametrize("damping", [0.02, 0.2])
+def test_slider_on_an_elastic_rod_answers_an_eccentric_as_textbooks_say(ratio: float, damping: float) -> None:
+    """Den Hartog, Mechanical Vibrations, chapter 2: a r^2/sqrt((1 - r^2)^2 + (2 zeta r)^2), and exp(-2 pi zeta/r).
+
+    The rod of 10^7 cranks leaves a pure sine of the crank's length, its second order is 1e-7 of that.
+    """
+    mass, stiffness = 1e-3, 100.0
+    design = {"a": 1.0, "b": 1e7, "m_crank": 0.0, "m_coupler": 0.0, "m_slider": mass, "driven_mass": mass}
+    design |= {"stiffness": stiffness, "damping": 2.0 * damping * np.sqrt(stiffness * mass)}
+    design["speed"] = ratio * np.sqrt(stiffness / mass)
+    found = sweep.summarise("slider_crank", design, "max_abs_lag_dynamic, floquet", accuracy=1e-6).iloc[0]
+    expected = ratio**2 / np.hypot(1.0 - ratio**2, 2.0 * damping * ratio)
+    assert found["max_abs_lag_dynamic"] == pytest.approx(expected, rel=1e-6)
+    assert found["floquet"] == pytest.approx(np.exp(-2.0 * np.pi * damping / ratio), rel=1e-12)
