@@ -50,6 +50,7 @@ from kernels.families.rssr.sampling import (
     sample,
     sample_block,
     sample_block_both,
+    sample_both,
     settle,
 )
 from kernels.jit import inline, kernel
@@ -129,23 +130,43 @@ def _highest(begin: int, end: int, m: Array) -> tuple[float, float, float, float
 
 @inline
 def _list_maxima(
-    block: int, at: Array, table: CosSin, of: Search, per_rho: float, first: Array | None, second: Array | None
-) -> None:
-    """List the local maxima of one order among the samples of a block, or among more samples where needed."""
-    count, (grid, size, m, first_peak) = _ZERO, of
+    block: int, at: Array, table: CosSin, of: Search, also: Search | None, per_rho: float, first: Array | None,
+    second: Array | None,
+) -> None:  # fmt: skip
+    """List the local maxima of one order among the samples of a block, or among more samples where needed.
+
+    With ``also``, those of the first order and, in ``also``, of the second, from the same samples.
+    """
+    count, more = _ZERO, _ZERO
     for i in range(block):
-        first_peak[i] = count
+        of.first[i] = count
+        if also is not None:
+            also.first[i] = more
         if at[i + ACROSS] * MOST < per_rho:
             continue
         n = FEWEST
         while n * at[i + ACROSS] < per_rho:
             n *= 2
         if n == FEWEST:
-            count = list_marked(int(grid[MARKS + i]), at, i, table, grid, Samples(i, BLOCK, n, 0), m, count)
+            count = _list_fewest(i, at, table, of, count)
+            if also is not None:
+                more = _list_fewest(i, at, table, also, more)
+            continue
+        if also is not None:
+            sample_both(at, i, table, n, of.size, also.size)
+            more = list_peaks(at, i, table, n, also.size, also.m, more)
         else:
-            sample(at, i, table, n, size, first, second)
-            count = list_peaks(at, i, table, n, size, m, count)
-    first_peak[block] = count
+            sample(at, i, table, n, of.size, first, second)
+        count = list_peaks(at, i, table, n, of.size, of.m, count)
+    of.first[block] = count
+    if also is not None:
+        also.first[block] = more
+
+
+@inline
+def _list_fewest(i: int, at: Array, table: CosSin, of: Search, count: int) -> int:
+    """List the maxima marked among the samples of a block; returns the new length of the list."""
+    return list_marked(int(of.grid[MARKS + i]), at, i, table, of.grid, Samples(i, BLOCK, FEWEST, 0), of.m, count)
 
 
 @inline
@@ -157,7 +178,7 @@ def _maxima_of(
     m, first_peak, first, second = of.m, of.first, heights.dpsi, heights.d2psi
     order = 1 if first is not None else (2 if second is not None else 3)
     # The parabola at the end is one more step; a maximum not settled then, one in hundreds, gets another three.
-    rounds = (2 if order == 1 else 3) - (1 if target > 1e-4 else 0)
+    rounds = (1 if target > 1e-10 else 2) if order == 1 else (2 if target > 1e-4 else 3)
     padded = (first_peak[block] + 7) & ~7  # whole vectors; the surplus is never read
     begin_at_vertex(padded, m)
     refine(_ZERO, padded, m, rounds, first, second)
@@ -209,8 +230,7 @@ def true_maxima(
     together shares reduction and samples, and has the bits that it has by itself.  The search is statistical, not
     proven; docs/rssr.md gives the number of random designs it was measured on.
     """
-    at, who, of = new_block(), np.empty(BLOCK, np.int64), _new_search()
-    of_q = Search(np.empty(GRID_SIZE), of.size, of.m, of.first)  # the first order is listed when the second is done
+    at, who, of, of_q = new_block(), np.empty(BLOCK, np.int64), _new_search(), _new_search()
     places, asked = Places(phi, error, phi_error), Heights(max_abs_dpsi, max_abs_d2psi, max_abs_d3psi)
     for start in range(0, designs.shape[0], BLOCK):
         count = min(BLOCK, designs.shape[0] - start)
@@ -226,18 +246,17 @@ def true_maxima(
             sample_block_both(padded, at, table, of.grid, of_q.grid)
             mark_peaks(padded, of.grid)
             mark_peaks(padded, of_q.grid)
-            _list_maxima(block, at, table, of_q, PER_RHO, None, max_abs_d2psi)
+            _list_maxima(block, at, table, of, of_q, PER_RHO, None, None)
             _maxima_of(start, block, at, who, of_q, target, status, places, Heights(None, max_abs_d2psi, None))
-            _list_maxima(block, at, table, of, PER_RHO, max_abs_dpsi, None)
             _maxima_of(start, block, at, who, of, target, status, places, Heights(max_abs_dpsi, None, None))
         elif max_abs_dpsi is not None or max_abs_d2psi is not None:
             sample_block(padded, at, table, of.grid, max_abs_dpsi, max_abs_d2psi)
             mark_peaks(padded, of.grid)
-            _list_maxima(block, at, table, of, PER_RHO, max_abs_dpsi, max_abs_d2psi)
+            _list_maxima(block, at, table, of, None, PER_RHO, max_abs_dpsi, max_abs_d2psi)
             heights = Heights(max_abs_dpsi, max_abs_d2psi, None)
             _maxima_of(start, block, at, who, of, target, status, places, heights)
         if max_abs_d3psi is not None:
             sample_block(padded, at, table, of.grid, None, None)
             mark_peaks(padded, of.grid)
-            _list_maxima(block, at, table, of, PER_RHO_JERK, None, None)
+            _list_maxima(block, at, table, of, None, PER_RHO_JERK, None, None)
             _maxima_of(start, block, at, who, of, target, status, places, Heights(None, None, max_abs_d3psi))

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kernels.arithmetic.intrinsics import largest, lowest_bit
+from kernels.arithmetic.intrinsics import largest, lowest_bit, smallest
 from kernels.arithmetic.vectors import Vector
 from kernels.curves.polynomials import rotate
 from kernels.families.rssr.block import BLOCK, CA, K0, K1, K2, W_SIZE, Y0, E
@@ -33,6 +33,8 @@ CAPACITY = BLOCK * MOST_PEAKS + 120
     _GUESS, MOVED, LAST, HEIGHT, ERROR, ROUNDING, REACH,
 ) = (k * CAPACITY for k in range(21))  # fmt: skip
 _ROWS = 21
+# Share of a rise that terms of fourth order add at most, for a step as long as the samples are apart.
+_FOURTH = 8.0
 _TURNED = 4e-12  # error of an angle that is the sum of a few turns by :func:`rotate`
 # From a maximum to the samples beside it the function falls about as far as the parabola that touches it at the top.
 # If it falls by less than this share of the parabola, there may be a second maximum between the samples.
@@ -57,20 +59,20 @@ def append(at: Array, k: int, u: float, v: float, samples: Vector, n: int, sampl
 
 
 @inline
-def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[float, float, float]:
-    """Wanted transfer function and its next two derivatives at a maximum of the list."""
+def _jet(m: Array, i: int, first: Array | None, second: Array | None) -> tuple[float, float, float, float | None]:
+    """Wanted transfer function and its next three derivatives at a maximum of the list, two where the third is dear."""
     e, y0, ca, k0, k1, k2 = m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2]
     u, v = m[i + _U], m[i + _V]
     p, q, j, k = follower(e, y0, ca, k0, k1, k2, u, v)
     if first is not None:
-        return p, q, j
+        return p, q, j, k
     if second is not None:
-        return q, j, k
+        return q, j, k, None
     # The fifth derivative only steers the iteration: a difference quotient of the fourth is enough.
     ahead = 1e-4 * m[i + _WIDTH]
     u, v = rotate(u, v, ahead)
     _, _, _, k_ahead = follower(e, y0, ca, k0, k1, k2, u, v)
-    return j, k, (k_ahead - k) / ahead
+    return j, k, (k_ahead - k) / ahead, None
 
 
 @inline
@@ -87,13 +89,22 @@ def begin_at_vertex(count: int, m: Array) -> None:
 
 
 @inline
+def _towards_zero(dy: float, per_d2y: float, d3y: float | None) -> float:
+    """Step to the zero of dy of Newton's method, or of Chebyshev's with a third derivative; ``per_d2y`` is 1/d2y."""
+    newton = -dy * per_d2y
+    if d3y is None:
+        return newton
+    return newton * min(max(1.0 - 0.5 * newton * d3y * per_d2y, 0.5), 2.0)
+
+
+@inline
 def refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, second: Array | None) -> None:
-    """Take Newton steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
+    """Take steps to the zero of the next derivative, uphill where it is not concave; all maxima side by side."""
     for _ in range(rounds):
         for i in range(begin, end):
-            y, dy, d2y = _jet(m, i, first, second)
+            y, dy, d2y, d3y = _jet(m, i, first, second)
             width = m[i + _WIDTH]
-            step = -dy / d2y if y * d2y < 0.0 else math.copysign(width, y * dy)
+            step = _towards_zero(dy, 1.0 / d2y, d3y) if y * d2y < 0.0 else math.copysign(width, y * dy)
             step = min(max(step, -0.5 * width), 0.5 * width)
             m[i + MOVED] += step
             m[i + LAST] = step
@@ -103,27 +114,41 @@ def refine(begin: int, end: int, m: Array, rounds: int, first: Array | None, sec
 
 
 @inline
+def _last_step(dy: float, d2y: float, d3y: float | None, sign: float, width: float) -> tuple[float, float, float]:
+    """Step to the top of the parabola or cubic at a point, its rise times ``sign``, and that rise's error."""
+    per = 1.0 / (d2y * width)  # one division gives both reciprocals
+    step = _towards_zero(dy, per * width, d3y)
+    if d3y is None:
+        rise = 0.5 * dy * step * sign
+        return step, rise, rise
+    rise = step * (dy + step * (0.5 * d2y + (1.0 / 6.0) * (step * d3y))) * sign
+    near = step * (per * d2y)
+    return step, rise, _FOURTH * near * near * abs(rise)
+
+
+@inline
 def finish(
     begin: int, end: int, m: Array, order: int, target: float, first: Array | None, second: Array | None,
     error: Array | None, phi_error: Array | None,
 ) -> None:  # fmt: skip
     """Compute the peak of the parabola through the last point, and its rise above the point as an error estimate.
 
+    With a third derivative it is a cubic; the estimate is then what terms of fourth order can add to that rise.
     If error estimates are wanted, also the rounding error and the error of the place.
     """
     for i in range(begin, end):
-        y, dy, d2y = _jet(m, i, first, second)
-        step = -dy / d2y
-        rise = 0.5 * dy * step * math.copysign(1.0, y)
-        peak, width = abs(y) + rise, m[i + _WIDTH]
-        trusted = (y * d2y < 0.0) & (rise <= target * peak) & (abs(m[i + MOVED]) <= width)
+        y, dy, d2y, d3y = _jet(m, i, first, second)
+        width = m[i + _WIDTH]
+        step, rise, left = _last_step(dy, d2y, d3y, math.copysign(1.0, y), width)
+        peak = abs(y) + rise
+        trusted = (y * d2y < 0.0) & (left <= target * peak) & (abs(m[i + MOVED]) <= width)
         trusted = trusted & (abs(peak - m[i + _GUESS]) <= 0.2 * peak)
         moved, bend = m[i + MOVED], 0.5 * abs(d2y)
         before, after = width + moved, width - moved
         trusted = trusted & (peak - m[i + _PEAK] >= _NEAREST * bend * moved * moved - _LEVEL * peak)
         trusted = trusted & (peak - m[i + _LEFT] >= _NEXT * bend * before * before)
         trusted = trusted & (peak - m[i + _RIGHT] >= _NEXT * bend * after * after)
-        m[i + ERROR] = rise if trusted else math.inf
+        m[i + ERROR] = left if trusted else math.inf
         if error is not None or phi_error is not None:
             of = Loop(m[i + _E], m[i + _Y0], m[i + _CA], m[i + _K0], m[i + _K1], m[i + _K2], m[i + _SIZE])
             relative, slope = rounding(order, of, m[i + _U], m[i + _V], peak)
@@ -136,11 +161,12 @@ def finish(
 @inline
 def _reach(m: Array, i: int, order: int, step: float, across: float, relative: float, slope: float) -> Any:
     """Error of the place of a peak; ``across`` is the peak's width, the others are rounding errors."""
-    # The error after a step of Newton's method is quadratic in the step, with a factor estimated from the step before;
-    # for the jerk the slope is good to a thousandth.
-    last = m[i + LAST]
-    left = 4.0 * largest(abs(step) / m[i + _WIDTH], step * step / (last * last + 1e-300))
-    left += 1e-3 if order == 3 else 0.0
+    # The error after a step of Newton's method is quadratic in the step, of Chebyshev's (order 1) cubic, with a factor
+    # estimated from the step before; for the jerk the slope is good to a thousandth.
+    # A step before that was 0 by chance tells nothing.
+    near, gain = abs(step) / m[i + _WIDTH], smallest(abs(step) / (abs(m[i + LAST]) + 1e-300), 1.0)
+    left = largest(near, gain * gain) if order > 1 else largest(near * near, gain * gain * gain)
+    left = 4.0 * left + (1e-3 if order == 3 else 0.0)
     return left * abs(step) + 4.0 * across * (relative + across * slope) + _TURNED
 
 
@@ -197,6 +223,17 @@ def sample(at: Array, k: int, table: CosSin, n: int, size: Array, first: Array |
         p, q, j, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
         size[1 + i] = abs(p) if first is not None else (abs(q) if second is not None else abs(j))
     size[0], size[n + 1] = size[n], size[1]
+
+
+@inline
+def sample_both(at: Array, k: int, table: CosSin, n: int, of_p: Array, of_q: Array) -> None:
+    """As :func:`sample`, of the first and the second order at once."""
+    e, y0, ca, k0, k1, k2 = at[k + E], at[k + Y0], at[k + CA], at[k + K0], at[k + K1], at[k + K2]
+    (cos, sin), begin = table, (n - FEWEST) & _NEVER_NEGATIVE
+    for i in range(n):
+        p, q, _, _ = follower(e, y0, ca, k0, k1, k2, cos[begin + i], sin[begin + i])
+        of_p[1 + i], of_q[1 + i] = abs(p), abs(q)
+    of_p[0], of_p[n + 1], of_q[0], of_q[n + 1] = of_p[n], of_p[1], of_q[n], of_q[1]
 
 
 @inline

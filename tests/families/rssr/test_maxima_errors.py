@@ -172,3 +172,17 @@ def test_margin_of_symmetric_mechanisms_with_two_equal_minima():
         assert abs(values(place) - margin) <= 1e-14 * size
         inner += abs(np.sin(place)) > 1e-3
     assert inner > 300
+
+
+def test_a_step_of_zero_does_not_spoil_the_error_of_the_place():
+    """Where the step before the last was 0 by chance, the quotient of the two steps told 1e+249 rad."""
+    lucky = np.array(
+        [
+            [1.7978803792741371, 45.67118718242865, 32.24142544000543, -12.133663913017486, 17.398258851254596,
+             37.234072164400544, -1.1164568395247798, -1.0],
+            [4.17105402316185, 26.710377169026707, 28.002048707881425, -36.22299592698721, -37.16785953738074,
+             17.622368064776566, 2.875314857112466, 1.0],
+        ]
+    )  # fmt: skip
+    found = maxima(lucky, 2)
+    assert np.all(found["phi_error"] < 1e-10)
