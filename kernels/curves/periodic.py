@@ -8,13 +8,14 @@ series follow the extremes and the mean square over a turn.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kernels.curves.root_search import bisected, false_position
 from kernels.jit import inline, kernel, part
-from kernels.types import EPS, Array
+from kernels.types import EPS, Array, Numbers
 
 NOTHING = 1e-14  # error of the coefficients by the drift of the rotations, as a share of the largest coefficient
 
@@ -100,6 +101,24 @@ def series(cosines: Array, sines: Array, phi: float) -> tuple[float, float]:
         slope += k * (sines[k] * c - cosines[k] * s)
         c, s = c * step_c - s * step_s, s * step_c + c * step_s
     return value, slope
+
+
+@inline
+def harmonics(waves: Numbers, count: int, u: Any, v: Any) -> tuple[Any, Any, Any, Any]:
+    """Sum of a_k cos(k phi) + b_k sin(k phi), and three derivatives, for u = cos(phi), v = sin(phi).
+
+    ``waves`` begins with a_1 ... a_count, b_1 ... b_count.  All may be complex, for the complex step.
+    """
+    zero = 0.0 * (waves[0] + u)
+    value, first, second, third = zero, zero, zero, zero
+    c, s = u, v
+    for k in range(count):
+        a, b, order = waves[k], waves[count + k], k + 1.0
+        even, odd = a * c + b * s, b * c - a * s
+        value, first = value + even, first + order * odd
+        second, third = second - order * order * even, third - order * order * order * odd
+        c, s = c * u - s * v, s * u + c * v
+    return value, first, second, third
 
 
 @inline

@@ -123,6 +123,19 @@ def sliding_bearings(
             out[3, i, j], out[4, i, j], out[5, i, j] = good * r.p1, good * r.p2, good * r.p3
 
 
+@inline
+def rolling_loads(
+    bearings: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
+) -> tuple[float, float]:
+    """Equivalent loads of two rolling bearings while the rocker overcomes ``moment`` without friction."""
+    pi1, pi2 = support_arms(bearings[i, 0], bearings[i, 1], bearings[i, 2], cos1, sin1, axial)
+    force = abs(moment / (bearings[i, 0] * cos1))
+    thrust, span = force * abs(axial), abs(bearings[i, 2] - bearings[i, 1])
+    first = equivalent_load(bearings, i, force * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
+    second = equivalent_load(bearings, i, force * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)
+    return first, second
+
+
 @kernel
 def rolling_bearings(
     t_tau: Array,
@@ -144,18 +157,12 @@ def rolling_bearings(
     out : (4, n, m); equivalent loads and lives of both bearings
     """
     for i in range(t_tau.shape[0]):
-        c, z1, z2 = bearings[i, 0], bearings[i, 1], bearings[i, 2]
         for j in range(t_tau.shape[1]):
             cos1, sin1, axial = in_plane(t_tau[i, j], t_rho[i, j], t_k[i, j])
-            pi1, pi2 = support_arms(c, z1, z2, cos1, sin1, axial)
             if status[i, j] == st.OK and not cos1 > 0.0:
                 status[i, j] = st.JAMMED
             good = 1.0 if status[i, j] == st.OK else math.nan
-            force = moment[i] / (c * cos1)
-            thrust = abs(force * axial)
-            span = abs(z2 - z1)
-            first = equivalent_load(bearings, i, abs(force) * pi1 / span, thrust if bearings[i, 10] == 1.0 else 0.0)
-            second = equivalent_load(bearings, i, abs(force) * pi2 / span, thrust if bearings[i, 10] == 2.0 else 0.0)
+            first, second = rolling_loads(bearings, i, moment[i], cos1, sin1, axial)
             out[0, i, j], out[1, i, j] = good * first, good * second
             out[2, i, j] = good * (bearings[i, 8] / first) ** bearings[i, 7]
             out[3, i, j] = good * (bearings[i, 8] / second) ** bearings[i, 7]

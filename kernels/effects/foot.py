@@ -46,24 +46,30 @@ class State(NamedTuple):
 
 
 @inline
-def _between(p0: float, p1: float, m0: float, m1: float, c0: float, c1: float, s: float) -> tuple[float, float, float]:
-    """Quintic with given ends, slopes, curvatures (by s) at the share s, and its first two derivatives; (4)."""
+def _quintic(path: Array, row: int, j: int) -> tuple[float, float, float, float, float, float]:
+    """Coefficients of a row of the path in cell j, from its values, slopes and curvatures by the share; (4)."""
+    n = path.shape[1]
+    h, j, k = TWO_PI / n, j % n, (j + 1) % n
+    p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
+    p1, m1, c1 = path[row, k], path[row + 1, k] * h, path[row + 2, k] * h * h
     d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
-    a3, a4, a5 = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
-    value = p0 + s * (m0 + s * (0.5 * c0 + s * (a3 + s * (a4 + s * a5))))
-    slope = m0 + s * (c0 + s * (3.0 * a3 + s * (4.0 * a4 + s * 5.0 * a5)))
-    return value, slope, c0 + s * (6.0 * a3 + s * (12.0 * a4 + s * 20.0 * a5))
+    return p0, m0, 0.5 * c0, 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
+
+
+@inline
+def on_path(path: Array, row: int, j: int, s: float) -> tuple[float, float, float]:
+    """Place of the rack in cell j at the share s, with derivatives by phi: height (row 0) or along the feed (row 3)."""
+    p0, m0, half, a3, a4, a5 = _quintic(path, row, j)
+    h = TWO_PI / path.shape[1]
+    value = p0 + s * (m0 + s * (half + s * (a3 + s * (a4 + s * a5))))
+    slope = m0 + s * (2.0 * half + s * (3.0 * a3 + s * (4.0 * a4 + s * 5.0 * a5)))
+    return value, slope / h, (2.0 * half + s * (6.0 * a3 + s * (12.0 * a4 + s * 20.0 * a5))) / (h * h)
 
 
 @inline
 def rack_height(path: Array, j: int, s: float) -> tuple[float, float, float]:
     """Height of the rack above the plate in cell j at the share s, with derivatives by phi."""
-    n = path.shape[1]
-    h, j, k = TWO_PI / n, j % n, (j + 1) % n
-    y, y1, y2 = _between(
-        path[0, j], path[0, k], path[1, j] * h, path[1, k] * h, path[2, j] * h * h, path[2, k] * h * h, s
-    )
-    return y, y1 / h, y2 / (h * h)
+    return on_path(path, 0, j, s)
 
 
 @inline
@@ -79,26 +85,9 @@ def extremes(rack: Array) -> tuple[bool, int, float, float]:
 
 
 @inline
-def _along(path: Array, j: int, s: float) -> float:
-    """Place of the rack along the feed in cell j at the share s."""
-    n = path.shape[1]
-    h, j, k = TWO_PI / n, j % n, (j + 1) % n
-    x, _, _ = _between(
-        path[3, j], path[3, k], path[4, j] * h, path[4, k] * h, path[5, j] * h * h, path[5, k] * h * h, s
-    )
-    return x
-
-
-@inline
 def quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -> None:
     """Compute coefficients (6,) of a row of the path in cell j as a polynomial in x, at the share at + size x; (4)."""
-    n = path.shape[1]
-    h, j, k = TWO_PI / n, j % n, (j + 1) % n
-    p0, m0, c0 = path[row, j], path[row + 1, j] * h, path[row + 2, j] * h * h
-    p1, m1, c1 = path[row, k], path[row + 1, k] * h, path[row + 2, k] * h * h
-    d, e, f = p1 - p0 - m0 - 0.5 * c0, m1 - m0 - c0, c1 - c0
-    out[0], out[1], out[2] = p0, m0, 0.5 * c0
-    out[3], out[4], out[5] = 10.0 * d - 4.0 * e + 0.5 * f, -15.0 * d + 7.0 * e - f, 6.0 * d - 3.0 * e + 0.5 * f
+    out[0], out[1], out[2], out[3], out[4], out[5] = _quintic(path, row, j)
     # repeated Horner's scheme moves the origin to the share ``at``
     for k in range(5):
         for i in range(4, k - 1, -1):
@@ -107,16 +96,6 @@ def quintic(path: Array, row: int, j: int, at: float, size: float, out: Array) -
     for i in range(6):
         out[i] *= factor
         factor *= size
-
-
-@inline
-def power_series(series: Array, count: int, x: float) -> tuple[float, float]:
-    """Value and derivative at x of a power series of ``count`` terms."""
-    y, slope = series[count - 1], 0.0
-    for i in range(count - 2, -1, -1):
-        slope = slope * x + y
-        y = y * x + series[i]
-    return y, slope
 
 
 @inline
@@ -265,7 +244,7 @@ def _record(tally: Array, path: Array, foot: Foot, state: State, j: int, low: fl
         low = _root(path, foot, state, j, low, high, 0)
     elif two < 0.0 < one:
         high = _root(path, foot, state, j, low, high, 0)
-    way = _along(path, j, high) - _along(path, j, low)
+    way = on_path(path, 3, j, high)[0] - on_path(path, 3, j, low)[0]
     tally[5] += way
     if state.mode == FLIGHT:
         tally[3] += (high - low) * (TWO_PI / path.shape[1])

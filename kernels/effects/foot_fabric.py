@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
+from kernels.curves.polynomials import value_and_slope
 from kernels.curves.root_search import bisected
 from kernels.effects.foot import (
     FLIGHT,
@@ -27,7 +28,6 @@ from kernels.effects.foot import (
     held,
     march_cell,
     note,
-    power_series,
     quintic,
     rack_height,
     written,
@@ -81,7 +81,7 @@ def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground
 @inline
 def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
     """Force and compression of the fabric under a foot at height y with speed v; (14)."""
-    g, slope = power_series(ground, 6, x)
+    g, slope = value_and_slope(ground, 5, x)
     return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
 
 
@@ -94,7 +94,7 @@ def _look(
         y, v = flown(foot, state, piece.begin + x * piece.angle)
         force, depth = _press(fabric, ground, y, v, x, piece.angle)
         return -min(force, depth * fabric.stiffness), y, v
-    y, slope = power_series(series, TERMS, x)
+    y, slope = value_and_slope(series, TERMS - 1, x)
     force, _ = _press(fabric, ground, y, slope / piece.angle, x, piece.angle)
     return force, y, slope / piece.angle
 
@@ -170,7 +170,7 @@ def _stretch(
     phi = piece.begin + end * piece.angle
     if piece.on_rack:
         quintic(path, 3, piece.j, piece.low, size, along)
-        way = power_series(along, 6, end)[0] - along[0]
+        way = value_and_slope(along, 5, end)[0] - along[0]
         tally[5] += way
         if state.mode == FLIGHT:
             tally[3] += end * piece.angle
@@ -187,7 +187,7 @@ def _stretch(
             tally[1] = phi
         note(tally, phi, FLIGHT)
         return State(FLIGHT, phi, y, v, phi), end
-    _, slope = power_series(ground, 6, end)
+    _, slope = value_and_slope(ground, 5, end)
     tally[6] = max(tally[6], slope / piece.angle - v)
     if not math.isnan(tally[1]) and math.isnan(tally[2]):
         tally[2] = phi

@@ -58,7 +58,7 @@ class Loading(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Inertia forces F = m (a - gravity) and torques T about the centres of mass, with their arms d."""
+    """Inertia forces F = m (a - gravity) less external ones and torques T about the centres of mass, with arms d."""
 
     f1: Vector
     t1: Vector
@@ -75,7 +75,6 @@ class Loads(NamedTuple):
     omega3: Vector
     j_red: float
     dj_red: float
-    a_g2: Vector
 
 
 class Reactions(NamedTuple):
@@ -113,8 +112,22 @@ def _torque(body: Body, omega: Vector, eps: Vector) -> Vector:
 
 
 @inline
-def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> Loads:
-    """Inertia forces and torques of the three bodies, reduced inertia and its derivative, for one pose."""
+def _less(force: Vector, torque: Vector, arm: Vector, wrenches: Array | None, i: int, k: int) -> tuple[Vector, Vector]:
+    """Inertia force and torque of a link less an external force on it and the moment about its frame origin.
+
+    F_i - F takes the place of F_i everywhere; T_i is corrected so that the moment about the origin is right.
+    """
+    if wrenches is None:
+        return force, torque
+    wrench = wrenches[i, k]
+    given, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
+    return sub(force, given), add(sub(torque, moment), cross(arm, given))
+
+
+@inline
+def loads_of(j: Joints, coupler: Coupler, given: Loading, i: int, k: int) -> Loads:
+    """Compute the loads of the three bodies, and reduced inertia with its derivative, in pose k of design i."""
+    bodies, drive = given.bodies[i], given.drive[i, k if given.drive.shape[1] > 1 else 0]
     gravity = (bodies[3 * BODY], bodies[3 * BODY + 1], bodies[3 * BODY + 2])
     torque, speed, change = drive[LOAD], drive[SPEED], drive[CHANGE]
     crank = _body(bodies[:BODY], j.rho_b, j.tau_b, j.u)
@@ -129,21 +142,20 @@ def inertia_loads(j: Joints, coupler: Coupler, bodies: Array, drive: Array) -> L
     # Rates of the coupler's centre of mass per unit speed serve the reduced inertia as well.
     v2 = add(coupler.v_b, cross(coupler.omega, rod.centre))
     a2 = add(coupler.a_b, spun(coupler.omega, coupler.eps, rod.centre))
-    a_g2 = mix(square, a2, change, v2)
     f1 = scale(crank.mass, sub(spun(omega1, eps1, crank.centre), gravity))
-    f2 = scale(rod.mass, sub(a_g2, gravity))
+    f2 = scale(rod.mass, sub(mix(square, a2, change, v2), gravity))
     a_g3 = mix(1.0, spun(omega3, eps3, rocker.centre), (1.0 - j.turns) * along, j.tau)
     f3 = scale(rocker.mass, sub(a_g3, gravity))
+    f2, t2 = _less(f2, _torque(rod, omega2, eps2), rod.centre, given.on_coupler, i, k)
+    f3, t3 = _less(f3, _torque(rocker, omega3, eps3), rocker.centre, given.on_follower, i, k)
     about_crank = _about_axis(crank, j.u)
     about_rocker = _about_axis(rocker, j.k) if j.turns > 0.0 else rocker.mass
     rod_omega = _inertia_times(rod, coupler.omega)
     j_red = about_crank + rod.mass * dot(v2, v2) + dot(coupler.omega, rod_omega) + about_rocker * j.dpsi * j.dpsi
     dj_red = 2.0 * (rod.mass * dot(v2, a2) + dot(rod_omega, coupler.eps) + about_rocker * j.dpsi * j.d2psi)
     return Loads(
-        f1, _torque(crank, omega1, eps1), crank.centre,
-        f2, _torque(rod, omega2, eps2), rod.centre,
-        f3, _torque(rocker, omega3, eps3), rocker.centre,
-        torque, omega1, omega2, omega3, j_red, dj_red, a_g2,
+        f1, _torque(crank, omega1, eps1), crank.centre, f2, t2, rod.centre, f3, t3, rocker.centre,
+        torque, omega1, omega2, omega3, j_red, dj_red,
     )  # fmt: skip
 
 
@@ -164,45 +176,6 @@ def borne(j: Joints, on: Loads) -> tuple[Vector, Vector]:
     at = mix(j.turns, j.D, slides, j.C)
     moment = add(moment, add(on.t3, cross(add(at, on.d3), on.f3)))
     return force, sub(sub(moment, scale(j.turns * on.torque, j.k)), cross(at, pushed))
-
-
-@inline
-def loads_of(j: Joints, coupler: Coupler, given: Loading, i: int, k: int) -> Loads:
-    """Inertia loads of pose k of design i, with the external loads on coupler and follower."""
-    on = inertia_loads(j, coupler, given.bodies[i], given.drive[i, k if given.drive.shape[1] > 1 else 0])
-    return _follower_loaded(_coupler_loaded(on, given.on_coupler, i, k), given.on_follower, i, k)
-
-
-@inline
-def _coupler_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
-    """Include an external force on the coupler and its moment about B in the loads.
-
-    F2 - F takes the place of F2 everywhere; T2 is corrected so that the moment about B is right.
-    """
-    if wrenches is None:
-        return on
-    wrench = wrenches[i, k]
-    force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
-    return Loads(
-        on.f1, on.t1, on.d1,
-        sub(on.f2, force), add(sub(on.t2, moment), cross(on.d2, force)), on.d2,
-        on.f3, on.t3, on.d3,
-        on.torque, on.omega1, on.omega2, on.omega3, on.j_red, on.dj_red, on.a_g2,
-    )  # fmt: skip
-
-
-@inline
-def _follower_loaded(on: Loads, wrenches: Array | None, i: int, k: int) -> Loads:
-    """Include an external force on the follower and its moment about D in the loads."""
-    if wrenches is None:
-        return on
-    wrench = wrenches[i, k]
-    force, moment = (wrench[0], wrench[1], wrench[2]), (wrench[3], wrench[4], wrench[5])
-    return Loads(
-        on.f1, on.t1, on.d1, on.f2, on.t2, on.d2,
-        sub(on.f3, force), add(sub(on.t3, moment), cross(on.d3, force)), on.d3,
-        on.torque, on.omega1, on.omega2, on.omega3, on.j_red, on.dj_red, on.a_g2,
-    )  # fmt: skip
 
 
 @inline

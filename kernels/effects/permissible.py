@@ -11,7 +11,7 @@ import math
 
 from kernels import status as st
 from kernels.curves.root_search import false_position
-from kernels.effects.bearings import equivalent_load, in_plane, sliding_criteria, sliding_data, support_arms
+from kernels.effects.bearings import in_plane, rolling_loads, sliding_criteria, sliding_data
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
 from kernels.types import Array, Status
@@ -36,12 +36,7 @@ def rolling_utilisation(
     bearings: Array, limits: Array, i: int, moment: float, cos1: float, sin1: float, axial: float
 ) -> float:
     """Larger equivalent load of the two bearings over the permissible one; inf where no torque passes."""
-    pi1, pi2 = support_arms(bearings[i, 0], bearings[i, 1], bearings[i, 2], cos1, sin1, axial)
-    force = moment / (bearings[i, 0] * cos1)
-    per_span = force / abs(bearings[i, 2] - bearings[i, 1])
-    thrust = abs(force * axial)
-    first = equivalent_load(bearings, i, pi1 * per_span, thrust if bearings[i, 10] == 1.0 else 0.0)
-    second = equivalent_load(bearings, i, pi2 * per_span, thrust if bearings[i, 10] == 2.0 else 0.0)
+    first, second = rolling_loads(bearings, i, moment, cos1, sin1, axial)
     return max(first, second) / limits[i, 0] if cos1 > 0.0 else math.inf
 
 

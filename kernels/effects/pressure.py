@@ -174,12 +174,7 @@ def pressure_extrema(
         most = 0.0
         for k in range(max(number, 1)):
             at[k] = at[k] - 2.0 * math.pi * math.floor(at[k] / (2.0 * math.pi))
-        for k in range(1, number):  # four at most: put in order by insertion
-            angle, place = at[k], k
-            while place > 0 and at[place - 1] > angle:
-                at[place] = at[place - 1]
-                place -= 1
-            at[place] = angle
+        at[:number].sort()
         for k in range(max(number, 1)):
             c, s = math.cos(at[k]), math.sin(at[k])
             sine = math.hypot(r0 + rc * c + rs * s, k0 + kc * c + ks * s)

@@ -9,7 +9,8 @@ with F the working force on the rod along lam, of which a part may act while the
 across lam on the rod's own guide is statically undetermined: the coupler guides the point already.  Its least value is
 zero, and zero is taken.
 
-A tool whose point moves freely, on the coupler or at the tip of a rocker, puts -(m (a_P - g) - F) on its link, (6).
+A tool whose point moves freely, on the coupler or at the tip of a rocker, puts -(m (a_P - g) - F) on its link, (6).  So
+does the rod, with the parts of these vectors along lam.
 """
 
 from __future__ import annotations
@@ -22,12 +23,14 @@ from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale
 from kernels.effects.coupler import orientation
 from kernels.effects.kinetostatics import CHANGE, SPEED, pose_status
 from kernels.jit import inline, kernel
+from kernels.linkage.bodies import vector
 from kernels.linkage.joints import Joints, read
 from kernels.types import Array, Status
 
-# Columns of the data matrix: mass; point M from B along the coupler, across it, along the rocker's axis; lam; gravity;
+# Columns of the data matrix of a tool that moves freely: mass; its point, of the coupler from B along it, across it
+# (k x s) and along the rocker's axis, of the rocker from D along rho, tau, k; gravity.  Of one on a line also lam;
 # piercing force, place of the fabric along lam, sense in which it lies.
-COLUMNS = 13
+FREE = 7
 
 
 class ToolLoad(NamedTuple):
@@ -37,8 +40,7 @@ class ToolLoad(NamedTuple):
     ----------
     wrench : (n, m, 6) force and moment on its link, about B on the coupler, about D on the rocker, fixed axes
     inertia : (n, m, 2) m s'^2, of a free point m |P'|^2, and its derivative by the crank angle
-    along : of :func:`tool_load` (n, m, 3), force of the coupler on the tool along lam, s', s''; of :func:`free_tool`
-        (n, m, 2), magnitude of the force on the tool and its power per unit crank speed
+    along : (n, m, 2) force of the link on the tool, along lam or its magnitude, and its power per unit crank speed
     """
 
     wrench: Array | None = None
@@ -54,10 +56,15 @@ def _put_wrench(out: Array | None, i: int, k: int, force: Vector, moment: Vector
 
 
 @inline
-def _put(out: Array | None, i: int, k: int, values: tuple[float, ...]) -> None:
+def _put(out: Array | None, i: int, k: int, good: float, first: float, second: float) -> None:
     if out is not None:
-        for x in range(len(values)):
-            out[i, k, x] = values[x]
+        out[i, k, 0], out[i, k, 1] = good * first, good * second
+
+
+@inline
+def _part(a: Vector, lam: Vector) -> Vector:
+    """Part of a vector along lam."""
+    return scale(dot(a, lam), lam)
 
 
 @inline
@@ -80,69 +87,26 @@ def tool_load(
     drive: Array,
     working: Array,
     finger: Array,
-    status: Status,
-    out: ToolLoad,
-) -> None:
-    """Compute a tool's force on the coupler, its moment about B, and the inertia that it adds to the crank's.
-
-    Parameters
-    ----------
-    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
-    data : (n, COLUMNS), see COLUMNS; lam a unit vector
-    drive : (n, m or 1, 3), of which the crank speed and its rate are read
-    working : (n, m or 1), force F on the tool along lam; a resisting one opposes s'
-    finger : (n,) DRIVEN or DRIVING
-    status : (n, m), in and out, as of :func:`kernels.effects.kinetostatics.kinetostatics`; what is not OK gives nan
-    out : the wanted outputs
-    """
-    for i in range(poses.shape[0]):
-        mass, lam = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
-        weight = mass * dot((data[i, 7], data[i, 8], data[i, 9]), lam)
-        for k in range(poses.shape[1]):
-            j = read(poses[i, k], designs[i])
-            coupler = orientation(j, finger[i])
-            status[i, k] = pose_status(status[i, k], j, coupler)
-            good = 1.0 if status[i, k] == st.OK else math.nan
-            at = arm(j, data[i])
-            first = dot(add(coupler.v_b, cross(coupler.omega, at)), lam)
-            second = dot(add(coupler.a_b, spun(coupler.omega, coupler.eps, at)), lam)
-            now = k if drive.shape[1] > 1 else 0
-            speed, change = drive[i, now, SPEED], drive[i, now, CHANGE]
-            on_tool = mass * (second * speed * speed + first * change) - weight
-            on_tool -= working[i, k if working.shape[1] > 1 else 0]
-            if data[i, 10] != 0.0:
-                way = speed * first
-                on_tool -= piercing(data[i, 10], data[i, 11], data[i, 12], dot(add(j.B, at), lam), way)
-            force = scale(-good * on_tool, lam)
-            _put_wrench(out.wrench, i, k, force, cross(at, force))
-            _put(out.inertia, i, k, (good * mass * first * first, good * 2.0 * mass * first * second))
-            _put(out.along, i, k, (good * on_tool, good * first, good * second))
-
-
-@kernel
-def free_tool(
-    poses: Array,
-    designs: Array,
-    data: Array,
-    drive: Array,
-    working: Array,
-    finger: Array,
     on_rocker: bool,
     status: Status,
     out: ToolLoad,
 ) -> None:
-    """Compute force and moment of a tool that moves freely with a point of the coupler or of the rocker; (6), (7).
+    """Compute a tool's force on its link, its moment there, and the inertia that it adds to the crank's.
 
     Parameters
     ----------
-    data : (n, 7), mass; the point: of the coupler from B along it, across it (k x s) and along the rocker's axis, of
-        the rocker from D along rho, tau, k; gravity
-    working : (n, m or 1, 3), force F on the tool in fixed axes
+    poses : (n, m, PER_POSE), designs : (n, PER_DESIGN), records of :mod:`kernels.linkage.joints`
+    data : (n, FREE or FREE + 6), see FREE; lam a unit vector
+    drive : (n, m or 1, 3), of which the crank speed and its rate are read
+    working : (n, m or 1, 3 or 1), force F on the tool in fixed axes, or along lam; a resisting one opposes s'
+    finger : (n,) DRIVEN or DRIVING
     on_rocker : whether the rocker carries the tool
-    poses, designs, drive, finger, status, out : as in :func:`tool_load`
+    status : (n, m), in and out, as of :func:`kernels.effects.kinetostatics.kinetostatics`; what is not OK gives nan
+    out : the wanted outputs
     """
+    on_line = data.shape[1] > FREE
     for i in range(poses.shape[0]):
-        mass, gravity = data[i, 0], (data[i, 4], data[i, 5], data[i, 6])
+        mass, gravity = data[i, 0], vector(data[i, 4:])
         for k in range(poses.shape[1]):
             j = read(poses[i, k], designs[i])
             coupler = orientation(j, finger[i])
@@ -158,9 +122,16 @@ def free_tool(
                 second = add(coupler.a_b, spun(coupler.omega, coupler.eps, at))
             now = k if drive.shape[1] > 1 else 0
             speed, change = drive[i, now, SPEED], drive[i, now, CHANGE]
-            now = k if working.shape[1] > 1 else 0
-            force = (working[i, now, 0], working[i, now, 1], working[i, now, 2])
-            on_tool = sub(scale(mass, sub(mix(speed * speed, second, change, first), gravity)), force)
+            needed = scale(mass, sub(mix(speed * speed, second, change, first), gravity))
+            given = working[i, k if working.shape[1] > 1 else 0]
+            if on_line:
+                lam = vector(data[i, FREE:])
+                place, way = dot(add(j.B, at), lam), speed * dot(first, lam)
+                load = dot(needed, lam) - given[0] - piercing(data[i, 10], data[i, 11], data[i, 12], place, way)
+                first, second, on_tool = _part(first, lam), _part(second, lam), scale(load, lam)
+            else:
+                on_tool = sub(needed, vector(given))
+                load = norm(on_tool)
             _put_wrench(out.wrench, i, k, scale(-good, on_tool), scale(-good, cross(at, on_tool)))
-            _put(out.inertia, i, k, (good * mass * dot(first, first), good * 2.0 * mass * dot(first, second)))
-            _put(out.along, i, k, (good * norm(on_tool), good * dot(on_tool, first)))
+            _put(out.inertia, i, k, good, mass * dot(first, first), 2.0 * mass * dot(first, second))
+            _put(out.along, i, k, good, load, dot(on_tool, first))

@@ -15,6 +15,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
+from kernels.curves.periodic import harmonics
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
 from kernels.types import TWO_PI, Numbers, Status
@@ -79,21 +80,6 @@ def normalised(law: int, x: Any) -> Motion:
 
 
 @inline
-def fourier(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
-    """Sum of c_k cos(k phi) + s_k sin(k phi), and its derivatives; (5)."""
-    u, v = np.cos(phi), np.sin(phi)
-    c, s = u, v
-    y, d1, d2, d3 = 0.0 * phi, 0.0 * phi, 0.0 * phi, 0.0 * phi
-    for k in range(HARMONICS):
-        a, b = designs[i, first + k], designs[i, first + HARMONICS + k]
-        n = k + 1.0
-        even, odd = a * c + b * s, b * c - a * s
-        y, d1, d2, d3 = y + even, d1 + n * odd, d2 - n * n * even, d3 - n * n * n * odd
-        c, s = c * u - s * v, c * v + s * u
-    return Motion(y, d1, d2, d3)
-
-
-@inline
 def law_is_valid(designs: Numbers, i: int, first: int) -> bool:
     """Whether the columns of the law are valid: a known law, phases within a turn, finite coefficients."""
     law, rise, dwell, fall = (
@@ -112,7 +98,7 @@ def motion(designs: Numbers, i: int, first: int, phi: Any) -> Motion:
     """Law of one valid design at one cam angle, and its derivatives with respect to the angle; (1)."""
     law = int(designs[i, LAW].real)
     if law == FOURIER:
-        return fourier(designs, i, first, phi)
+        return Motion(*harmonics(designs[i, first:], HARMONICS, np.cos(phi), np.sin(phi)))
     rise, dwell, fall = designs[i, RISE], designs[i, DWELL], designs[i, FALL]
     t = phi - designs[i, START]
     t = t - TWO_PI * math.floor(t.real / TWO_PI)

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
+from kernels.curves.periodic import harmonics
 from kernels.curves.root_search import bisected
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import put_block, write
 from kernels.linkage.verdict import pose_status
-from kernels.types import EPS, Array, Status
+from kernels.types import EPS, TWO_PI, Array, Status
 
 
 @inline
@@ -120,49 +121,56 @@ class Reduced(NamedTuple):
 
 
 @inline
-def law(designs: Array, i: int, u: float, v: float) -> tuple[float, float, float]:
+def law(designs: Array, i: int, u: Any, v: Any) -> tuple[Any, Any, Any]:
     """Return P and its first two derivatives for u = cos(phi), v = sin(phi); (9)."""
-    zero = 0.0 * (designs[i, FIRST] + u)
-    value, first, second = zero, zero, zero
-    # Cosines and sines of the multiples by recursion.
-    c, s = u, v
-    for k in range(HARMONICS):
-        a, b, order = designs[i, FIRST + k], designs[i, FIRST + HARMONICS + k], k + 1.0
-        wave, turned = a * c + b * s, b * c - a * s
-        value, first, second = value + wave, first + order * turned, second - order * order * wave
-        c, s = c * u - s * v, s * u + c * v
+    value, first, second, _ = harmonics(designs[i, FIRST:], HARMONICS, u, v)
     return value, first, second
 
 
 @inline
-def _falls(phi: float, designs: Array, i: int) -> bool:
-    return law(designs, i, math.cos(phi), math.sin(phi))[1].real < 0.0
+def _curve(phi: float, designs: Array, i: int, needs: tuple[Reduced, float] | None) -> tuple[float, float]:
+    """Evaluate a curve to be maximised over the cam angle, and its derivative.
+
+    It is S' cot - S, the radius needed less a constant, for a reduced design and cot; for None it is -P, the thread
+    given, of the real parts: where it is most a complex step of the place changes nothing.
+    """
+    value, first, second = law(designs, i, math.cos(phi), math.sin(phi))
+    if needs is None:
+        return -value.real, -first.real
+    r, cotangent = needs
+    thread = r.store + value / r.unit
+    s = math.sqrt(displacement(thread, r.across_z, r.across_x))
+    ds, d2s = follow(s, thread, first / r.unit, second / r.unit)
+    return ds * cotangent - s, d2s * cotangent - ds
 
 
 @inline
-def lowest(designs: Array, i: int) -> tuple[float, float]:
-    """Find cosine and sine of the cam angle where P is least: of all valleys of LOOKS samples, by the slope's zero.
+def _rises(phi: float, designs: Array, i: int, needs: tuple[Reduced, float] | None) -> bool:
+    return _curve(phi, designs, i, needs)[1] > 0.0
 
-    The lowest sample may stand in a valley that is not the lowest: each whose parabola may reach as deep is followed.
+
+@inline
+def _largest(designs: Array, i: int, needs: tuple[Reduced, float] | None, looks: int) -> tuple[float, float]:
+    """Find the largest value of a curve over the turn, and its cam angle, from ``looks`` samples.
+
+    The highest sample may stand on a top that is not the highest: each whose parabola may reach as high is followed to
+    the zero of the slope.
     """
-    step = 2.0 * math.pi / LOOKS
-    # real parts only: where P is least its slope is zero, so a complex step of the place does not change the value
-    least = math.inf
-    for j in range(LOOKS):
-        least = min(least, law(designs, i, math.cos(step * j), math.sin(step * j))[0].real)
-    best, u, v = math.inf, 1.0, 0.0
-    before = law(designs, i, math.cos(step), -math.sin(step))[0].real
-    here = law(designs, i, 1.0, 0.0)[0].real
-    for j in range(LOOKS):
-        after = law(designs, i, math.cos(step * (j + 1)), math.sin(step * (j + 1)))[0].real
-        if here <= min(before, after) and here - (max(before, after) - here) <= least:
-            low, _ = bisected(_falls, step * (j - 1), step * (j + 1), designs, i)
-            c, s = math.cos(low), math.sin(low)
-            value = law(designs, i, c, s)[0].real
-            if value < best:
-                best, u, v = value, c, s
+    step, most = TWO_PI / looks, -math.inf
+    for j in range(looks):
+        most = max(most, _curve(step * j, designs, i, needs)[0])
+    best, where = -math.inf, 0.0
+    before, here = _curve(-step, designs, i, needs)[0], _curve(0.0, designs, i, needs)[0]
+    for j in range(looks):
+        after = _curve(step * (j + 1), designs, i, needs)[0]
+        if here >= max(before, after) and here + (here - min(before, after)) >= most:
+            low, _ = bisected(_rises, step * (j - 1), step * (j + 1), designs, i, needs)
+            # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
+            value = max(_curve(low, designs, i, needs)[0], here)
+            if value > best:
+                best, where = value, low
         before, here = here, after
-    return u, v
+    return best, where
 
 
 @inline
@@ -177,8 +185,8 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     # a store this small against the rest would have squares below float64 after scaling
     valid = valid and designs[i, 0].real > 1e-140 * size
     unit, per_unit = unit_near(size if valid else 1.0)
-    u, v = lowest(designs, i)
-    thread = (designs[i, 0] + law(designs, i, u, v)[0]) * per_unit
+    _, lowest = _largest(designs, i, None, LOOKS)
+    thread = (designs[i, 0] + law(designs, i, math.cos(lowest), math.sin(lowest))[0]) * per_unit
     across_z, across_x = designs[i, 2] * per_unit, (designs[i, 3] - designs[i, 1]) * per_unit
     square = displacement(thread, across_z, across_x)
     least = np.sqrt(square) if reaches(square.real, thread.real) == st.OK else math.nan * square
@@ -276,45 +284,9 @@ def least_radius(designs: Array, status: Status, radius: Array, place: Array, an
             best, where = -math.inf, 0.0
             # rise and return: the guide jams alike whichever way the follower is pressed aside
             for sign in (1.0, -1.0):
-                value, at = _largest(designs, i, r, sign * cotangent)
+                value, at = _largest(designs, i, (r, sign * cotangent), ROOT_LOOKS)
                 if value > best:
                     best, where = value, at
             radius[i] = max(best + r.least, 0.0) * r.unit
             # the bisection may have left the turn at its seam
-            place[i] = where - 2.0 * math.pi * np.rint(where / (2.0 * math.pi))
-
-
-@inline
-def _need(designs: Array, i: int, r: Reduced, cotangent: float, phi: float) -> tuple[float, float]:
-    """Evaluate S' cot - S, the radius needed at a cam angle less a constant, and its derivative."""
-    value, first, second = law(designs, i, math.cos(phi), math.sin(phi))
-    thread = r.store + value / r.unit
-    s = math.sqrt(displacement(thread, r.across_z, r.across_x))
-    ds, d2s = follow(s, thread, first / r.unit, second / r.unit)
-    return ds * cotangent - s, d2s * cotangent - ds
-
-
-@inline
-def _needs_more(phi: float, designs: Array, i: int, r: Reduced, cotangent: float) -> bool:
-    """Whether the radius needed rises with the cam angle."""
-    return _need(designs, i, r, cotangent, phi)[1] > 0.0
-
-
-@inline
-def _largest(designs: Array, i: int, r: Reduced, cotangent: float) -> tuple[float, float]:
-    """Find the largest radius needed over the turn and its place: of all tops of the samples, by the slope's zero."""
-    step, largest = 2.0 * math.pi / ROOT_LOOKS, -math.inf
-    for j in range(ROOT_LOOKS):
-        largest = max(largest, _need(designs, i, r, cotangent, step * j)[0])
-    best, where = -math.inf, 0.0
-    before, here = _need(designs, i, r, cotangent, -step)[0], _need(designs, i, r, cotangent, 0.0)[0]
-    for j in range(ROOT_LOOKS):
-        after = _need(designs, i, r, cotangent, step * (j + 1))[0]
-        if here >= max(before, after) and here + (here - min(before, after)) >= largest:
-            low, _ = bisected(_needs_more, step * (j - 1), step * (j + 1), designs, i, r, cotangent)
-            # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
-            value = max(_need(designs, i, r, cotangent, low)[0], here)
-            if value > best:
-                best, where = value, low
-        before, here = here, after
-    return best, where
+            place[i] = where - TWO_PI * np.rint(where / TWO_PI)

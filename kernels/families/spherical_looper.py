@@ -52,7 +52,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for links of no length and for numbers that are not finite."""
     d = designs[i]
     unit, per = unit_near(d[0])
-    swings = reduce_crank(d, per)
+    swings = reduce_crank(d, per, d[7].real)
     o = d[8] * per
     sd, cd, sg, cg = np.sin(d[9]), np.cos(d[9]), np.sin(d[10]), np.cos(d[10])
     axis = (sd * cg, sd * sg, cd)

@@ -2,9 +2,9 @@
 
 The frame is the rocker's: its axis is z, its ball moves on the circle C = c (cos psi, sin psi, 0).  The driving ball M
 has the coordinates (x, y, z), and the coupler's length b is the distance of M and C.  A crank may carry M, or a link
-that itself moves.  The families of the loopers work from this.
+that itself moves.  The families of the loopers and of the feed work from this.
 
-Both loopers have the same drive, a crank about an inclined axis, a coupler and a rocker about z: X runs along the
+They have the same drive, a crank about an inclined axis, a coupler and a rocker about z: X runs along the
 common perpendicular from the crank's axis to the rocker's, Z along the rocker's axis; the crank's axis is
 (0, sin alpha, cos alpha), as for the spatial crank-rocker (docs/rssr.md).
 """
@@ -131,12 +131,12 @@ class Crank(NamedTuple):
 
 
 @inline
-def reduce_crank(d: Any, per: float) -> Crank:
-    """Constants from the first eight columns of a design, a b c e f g alpha branch; ``per`` scales its lengths."""
+def reduce_crank(d: Any, per: float, branch: float) -> Crank:
+    """Constants from the first seven columns of a design, a b c e f g alpha; ``per`` scales its lengths."""
     a, b, c, e, f, g = d[0] * per, d[1] * per, d[2] * per, d[3] * per, d[4] * per, d[5] * per
-    sa, ca, branch = np.sin(d[6]), np.cos(d[6]), d[7].real
+    sa, ca = np.sin(d[6]), np.cos(d[6])
     size = a.real + abs(e.real) + abs(f.real) + abs(g.real)
-    valid = 0.0 < a.real <= 1.0 and 0.0 < b.real < 1e140 and 0.0 < c.real < 1e140 and size < 1e140
+    valid = a.real > 0.0 and 0.0 < b.real < 1e140 and 0.0 < c.real < 1e140 and size < 1e140
     valid = valid and abs(d[6].real) < 1e5 and branch * branch == 1.0
     return Crank(a, b, c, e, sa, ca, f * sa, f * ca, g, branch, size, valid)
 

@@ -93,13 +93,8 @@ def rssr_arc_ends(requirements: Array, ends: Array) -> None:
         ends[i, 2], ends[i, 3] = second, second + math.pi
         ends[i, 4], ends[i, 5] = 0.5 * (infinite - phi0), 0.5 * (infinite - phi0) + math.pi
         ends[i, 6], ends[i, 7] = 0.5 * (-infinite - phi0), 0.5 * (-infinite - phi0) + math.pi
-        for k in range(8):
-            turned = ends[i, k] % TWO_PI
-            place = k
-            while place > 0 and not (ends[i, place - 1] <= turned) and turned == turned:
-                ends[i, place] = ends[i, place - 1]
-                place -= 1
-            ends[i, place] = turned
+        ends[i] %= TWO_PI
+        ends[i].sort()
 
 
 @kernel
@@ -112,15 +107,10 @@ def rssp_arc_ends(requirements: Array, ends: Array) -> None:
     ends : (n, 4) out [rad] in [0, 2 pi), ascending
     """
     for i in range(requirements.shape[0]):
-        phi0 = requirements[i, 1]
+        second = 0.5 * math.pi - requirements[i, 1]
         ends[i, 0], ends[i, 1] = 0.5 * math.pi, 1.5 * math.pi
-        for k in range(2, 4):
-            turned = (0.5 * math.pi - phi0 + (k - 2) * math.pi) % TWO_PI
-            place = k
-            while place > 0 and ends[i, place - 1] > turned:
-                ends[i, place] = ends[i, place - 1]
-                place -= 1
-            ends[i, place] = turned
+        ends[i, 2], ends[i, 3] = second % TWO_PI, (second + math.pi) % TWO_PI
+        ends[i].sort()
 
 
 PARAMETERS = ("a", "b", "c", "e", "f", "g", "alpha")

@@ -160,12 +160,9 @@ def heddle_rods(positions: Array, rods: Array, count: Status, status: Status) ->
                     end, _ = lever_angle(frame, arm, lever, rod, side, xi2)
                     if abs(start - end) > math.pi:  # the lever goes the other way round
                         continue
-                    place = count[i]
-                    while place > 0 and rods[i, place - 1] > rod:
-                        rods[i, place] = rods[i, place - 1]
-                        place -= 1
-                    rods[i, place] = rod
+                    rods[i, count[i]] = rod
                     count[i] += 1
+        rods[i, : count[i]].sort()
         status[i] = st.SINGULAR if singular else (st.OK if count[i] > 0 else st.NOT_ADMISSIBLE)
 
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kernels.effects.tool import ToolLoad, free_tool, tool_load
+from kernels.effects.tool import ToolLoad, tool_load
 from kernels.types import Status
 from sweep.effects import loads
-from sweep.effects.base import ON_LINE, ON_TIP, Effect, tool_place
+from sweep.effects.base import ON_TIP, Effect, tool_place
 from sweep.effects.motion import CONSTRUCTION
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output
@@ -47,22 +47,14 @@ def _loaded(scene: Scene) -> bool:
 
 
 def _data(scene: Scene) -> tuple[Array, Array]:
-    """Columns of the kernel of a tool on a line, and the working force, (n, 1) or over the turn (n, m)."""
+    """Columns of the kernel of a tool, and the working force, (n, m or 1, 3), or (n, m or 1, 1) along its line."""
     place = scene.family.find(ToolPoint)
-    assert place is not None and place.direction is not None
-    gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
-    mass, _, *pierce = (scene.inputs[p.name][:, None] for p in loads.TOOL)
-    data = np.hstack([mass, place.point(scene.designs), place.direction(scene.designs), gravity, *pierce])
-    return np.ascontiguousarray(data), np.ascontiguousarray(scene.load("tool_force"))
-
-
-def _free_data(scene: Scene) -> tuple[Array, Array]:
-    """Columns of the kernel of a tool that moves freely, and the working force, (n, m or 1, 3)."""
-    place = scene.family.find(ToolPoint)
-    tip = loads.tip_from(scene, scene.records[1][:, 11]) if place is None else place.point(scene.designs)
-    gravity = scene.table(tuple(p.name for p in loads.GRAVITY))
-    data = np.column_stack([scene.inputs["m_tool"], tip, gravity])
-    return data, np.stack(np.broadcast_arrays(*(scene.load(name) for name in _FORCES)), axis=2)
+    point = loads.tip_from(scene, scene.records[1][:, 11]) if place is None else place.point(scene.designs)
+    data = np.column_stack([scene.inputs["m_tool"], point, scene.table(tuple(p.name for p in loads.GRAVITY))])
+    if place is None or place.direction is None:
+        return data, np.stack(np.broadcast_arrays(*(scene.load(name) for name in _FORCES)), axis=2)
+    pierce = [scene.inputs[p.name] for p in loads.TOOL[2:]]
+    return np.column_stack([data, place.direction(scene.designs), *pierce]), scene.load("tool_force")[:, :, None]
 
 
 def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
@@ -80,28 +72,20 @@ def weighs(scene: Scene, drive: Array, reduced: bool) -> Weighs:
 
 
 def _fill(scene: Scene, drive: Array, status: Status, out: ToolLoad) -> None:
-    """Run the kernel of a tool on a line, or of one that moves freely."""
-    place, finger = tool_place(scene.family), scene.inputs["finger"]
-    if place == ON_LINE:
-        data, force = _data(scene)
-        tool_load(*scene.records, data, drive, force, finger, status, out)
-    else:
-        data, force = _free_data(scene)
-        free_tool(*scene.records, data, drive, force, finger, place == ON_TIP, status, out)
+    """Run the kernel of a tool."""
+    data, force = _data(scene)
+    on_rocker = tool_place(scene.family) == ON_TIP
+    tool_load(*scene.records, data, drive, np.ascontiguousarray(force), scene.inputs["finger"], on_rocker, status, out)
 
 
 def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Compute the force at the working point and its share in the driving torque."""
     speed, change = scene.crank()
     drive = np.stack(np.broadcast_arrays(np.zeros_like(speed), speed, change), axis=2)
-    status, place = scene.status(), tool_place(scene.family)
-    along = np.empty((*scene.shape, 3 if place == ON_LINE else 2))
+    status, along = scene.status(), np.empty((*scene.shape, 2))
     _fill(scene, drive, status, ToolLoad(along=along))
-    load, torque = along[:, :, 0], along[:, :, 1]
-    if place == ON_LINE:  # the kernel returns the travel per radian instead of the torque
-        torque = load * torque
-    first, second = TIP_OUTPUTS if place == ON_TIP else OUTPUTS
-    return chosen({first.name: load, second.name: torque}, wanted, status)
+    load, torque = TIP_OUTPUTS if tool_place(scene.family) == ON_TIP else OUTPUTS
+    return chosen({load.name: along[:, :, 0], torque.name: along[:, :, 1]}, wanted, status)
 
 
 _FREE = "(6) a tool that moves freely with its point P: its load is |m_tool (a_P - gravity) - tool_force|"

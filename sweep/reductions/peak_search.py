@@ -18,14 +18,13 @@ from sweep.quantities.kinds import Request
 from sweep.reductions import refine, rounding, sampling
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
 from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
-from sweep.reductions.resolution import MATTERS, broken, denser, nearest
+from sweep.reductions.resolution import MATTERS, PER_SINGULARITY, broken, denser, nearest
 from sweep.reductions.window import Window, edges
 
 START = 32  # first number of samples
 LIMIT = 32768  # largest number of samples, after which panels are tried
 SHARE = 0.6  # a peak below this share of the highest sample is not refined
 ROUGH = 0.1  # fourth difference of samples relative to their size above which they do not resolve the curve
-PER_SINGULARITY = 12.0  # samples per distance of the nearest complex singularity
 NARROWEST = 8.0 * PER_SINGULARITY / LIMIT  # distance [rad] below which panels resolve a peak with fewer poses
 BREAKING = 512  # samples from which on a rough curve may be a jump
 DISAGREEMENT = 0.05  # allowed between the peak guessed from the samples and the refined one

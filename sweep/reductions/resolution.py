@@ -88,7 +88,7 @@ def broken(family: Family, designs: Array, near: Singularities, status: Status) 
         status[rows[gap]] = DESIGN_STATUS[each[gap, (each[gap] != st.OK).argmax(axis=1)]]
 
 
-FAR, CLOSE = 10.0, 0.1  # distances of singularities [rad]; panels crowd about one that is nearer than the latter
+CLOSE = 0.1  # distance of a singularity [rad] below which panels crowd about it
 BENDING = 128  # even samples on which roots of effects' functions are bracketed
 LOOK = 0.25  # spacing of further samples relative to the distance of a singularity
 PER_PANEL = 0.25  # waves per first panel, at most

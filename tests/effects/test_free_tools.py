@@ -11,7 +11,7 @@ import pytest
 
 import sweep
 from kernels import status as st
-from kernels.effects.tool import ToolLoad, free_tool
+from kernels.effects.tool import ToolLoad, tool_load
 from sweep.effects import all_inputs
 from sweep.effects.scene import first_scene
 from sweep.families import family
@@ -135,7 +135,7 @@ def test_compiled_free_tool_equals_plain_python_bit_for_bit(on_rocker):
     data = np.array([[MASS, *TIP, 3.0, -9810.0, 8.0]])
     drive, force = np.array([[[0.0, 500.0, 30.0]]]), np.array([[[-12.0, 4.0, 7.0]]])
     results = []
-    for function in (free_tool, free_tool.py_func):
+    for function in (tool_load, tool_load.py_func):
         out = [np.empty((1, 5, k)) for k in (6, 2, 2)]
         status = scene.status()
         function(*scene.records, data, drive, force, np.zeros(1), on_rocker, status, ToolLoad(*out))

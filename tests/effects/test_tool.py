@@ -202,13 +202,13 @@ def test_compiled_tool_equals_plain_python_bit_for_bit():
     scene = first_scene(
         family("guide"), designs, Angles.of(PHI[None, :40:8]), {k: v.astype(float) for k, v in given.items()}
     )
-    data = np.array([[2.5e-5, 75.0, 12.0, 0.0, 0.2, 0.9, 0.0, 0.0, -9810.0, 0.0, 3.0, 50.0, -1.0]])
-    drive, force = np.array([[[0.0, 500.0, 30.0]]]), np.array([[-12.0]])
+    data = np.array([[2.5e-5, 75.0, 12.0, 0.0, 0.0, -9810.0, 0.0, 0.2, 0.9, 0.0, 3.0, 50.0, -1.0]])
+    drive, force = np.array([[[0.0, 500.0, 30.0]]]), np.array([[[-12.0]]])
     results = []
     for function, loads_of in ((tool_load, kinetostatics), (tool_load.py_func, kinetostatics.py_func)):
-        out = [np.empty((1, 5, k)) for k in (6, 2, 3)]
+        out = [np.empty((1, 5, k)) for k in (6, 2, 2)]
         forces, status = np.empty((1, 5, 18)), scene.status()
-        function(*scene.records, data, drive, force, np.zeros(1), status, ToolLoad(*out))
+        function(*scene.records, data, drive, force, np.zeros(1), False, status, ToolLoad(*out))
         given = Loading(np.linspace(0.1, 0.7, 33)[None] * 1e-4, drive, out[0])
         loads_of(*scene.records, np.zeros(1), given, status, forces, None, None)
         results.append([status, *out, forces])

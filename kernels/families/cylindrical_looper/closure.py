@@ -49,7 +49,7 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     """Constants of one design; ``valid`` is false for links of no length and for numbers that are not finite."""
     d = designs[i]
     unit, per = unit_near(d[0])
-    swings = reduce_crank(d, per)
+    swings = reduce_crank(d, per, d[7].real)
     moves = reduce_scaled(d[8] * per, d[9] * per, d[10] * per, d[11] * per, d[12], d[14].real, unit)
     point = (d[16] * per, d[17] * per, d[18] * per)
     slides = d[15].real

@@ -8,19 +8,20 @@ from typing import Any
 import numpy as np
 
 from kernels import status as st
+from kernels.arithmetic.complex_step import arctan2
 from kernels.curves.root_search import false_position
 from kernels.families.feed.closure import (
     Driven,
     Reduced,
-    angle_of,
+    Turned,
     bar_angle,
+    carried,
     eccentric,
-    point_of_rack,
     reduce_design,
-    rocker_angle,
     rocker_pin,
 )
 from kernels.jit import inline, kernel
+from kernels.linkage.driven_ball import Swung
 from kernels.types import TWO_PI, Array, Status
 
 # Outputs of :func:`poses`, in order: angles, their derivatives, points of the rack, derivatives of the tooth.
@@ -31,27 +32,23 @@ OUTPUTS = (
 
 
 @inline
-def rack_at(
-    r: Reduced, u: Any, v: Any
-) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any, Any, Any], Driven, Driven, int]:
-    """Rocker and rack as (cos, sin, first, second derivative), pins H and E, and the status of the pose."""
-    cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
-    h = rocker_pin(r, cos, sin, one, two)
+def rack_at(r: Reduced, u: Any, v: Any) -> tuple[Swung, Turned, Driven, Driven, int]:
+    """Rocker and rack, pins H and E, and the status of the pose."""
+    rocker, h = rocker_pin(r.rocker, r.arm, r.cos_arm, r.sin_arm, u, v)
     e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
-    bar_cos, bar_sin, bar_one, bar_two, bar_code = bar_angle(r, h, e)
-    if not r.valid:
-        code = st.INVALID_INPUT
+    bar = bar_angle(r, h, e)
+    code = rocker.status if r.valid else st.INVALID_INPUT
     # The rocker's status comes first, but its dead point still has a position: a rack that has none is worse.
-    if code == st.OK or (code == st.DEAD_POINT and bar_code in (st.NOT_ASSEMBLED, st.SINGULAR)):
-        code = bar_code
-    return (cos, sin, one, two), (bar_cos, bar_sin, bar_one, bar_two), h, e, code
+    if code == st.OK or (code == st.DEAD_POINT and bar.status in (st.NOT_ASSEMBLED, st.SINGULAR)):
+        code = bar.status
+    return rocker, bar, h, e, code
 
 
 @inline
 def tooth_at(r: Reduced, u: Any, v: Any) -> tuple[Driven, int]:
     """Path of the tooth and the status of the pose."""
     _, bar, h, _, code = rack_at(r, u, v)
-    return point_of_rack(h, bar[0], bar[1], bar[2], bar[3], r.tx, r.ty), code
+    return carried(h, bar, r.tx, r.ty), code
 
 
 @kernel
@@ -78,11 +75,10 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
             status[i, j] = code
             room = 1.0 if code == st.OK or code == st.DEAD_POINT else math.nan
             scale = r.unit * room
-            f = point_of_rack(h, bar[0], bar[1], bar[2], bar[3], r.fx, r.fy)
-            t = point_of_rack(h, bar[0], bar[1], bar[2], bar[3], r.tx, r.ty)
+            f, t = carried(h, bar, r.fx, r.fy), carried(h, bar, r.tx, r.ty)
             values = (
-                (angle_of(rocker[0], rocker[1]) + r.dh) * room, rocker[2] * room, rocker[3] * room,
-                angle_of(bar[0], bar[1]) * room, bar[2] * room, bar[3] * room,
+                (arctan2(rocker.sin, rocker.cos) + r.dh) * room, rocker.first * room, rocker.second * room,
+                arctan2(bar.sin, bar.cos) * room, bar.first * room, bar.second * room,
                 h.x * scale, h.y * scale, e.x * scale, e.y * scale, f.x * scale, f.y * scale,
                 t.x * scale, t.y * scale, t.x1 * scale, t.y1 * scale, t.x2 * scale, t.y2 * scale,
             )  # fmt: skip
@@ -108,9 +104,8 @@ def lift_rows(designs: Array, cos_phi: Array, sin_phi: Array, chi: Array, status
         row = i if cos_phi.shape[0] > 1 else 0
         for j in range(cos_phi.shape[1]):
             u, v = cos_phi[row, j], sin_phi[row, j]
-            cos, sin, one, two, code = rocker_angle(r.rocker, u, v)
-            status[i, j] = code if r.valid else st.INVALID_INPUT
-            h = rocker_pin(r, cos, sin, one, two)
+            rocker, h = rocker_pin(r.rocker, r.arm, r.cos_arm, r.sin_arm, u, v)
+            status[i, j] = rocker.status if r.valid else st.INVALID_INPUT
             e = eccentric(r.x_ecc, r.y_ecc, r.r_ecc, r.cos_ecc, r.sin_ecc, u, v)
             wx, wy = h.x - e.x, h.y - e.y
             x, y = math.cos(chi[i, j]), math.sin(chi[i, j])

@@ -18,8 +18,9 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import unit_near
-from kernels.families.feed.closure import Driven, Rocker, eccentric, rocker_angle
+from kernels.families.feed.closure import Driven, eccentric, rocker_pin
 from kernels.jit import inline, kernel
+from kernels.linkage.driven_ball import reduce_crank
 from kernels.types import EPS, TWO_PI, Array, Status
 
 NODES = 180
@@ -62,18 +63,10 @@ def _scaled(designs: Array, i: int, d: Array) -> tuple[float, bool]:
 @inline
 def _leads(d: Array, u: Any, v: Any) -> tuple[Driven, Driven, Driven, int]:
     """Three driven points with their derivatives, and the status of the rocker."""
-    sa, ca = np.sin(d[6]), np.cos(d[6])
-    rocker = Rocker(
-        d[0], d[2], d[3], d[4] * sa, d[5] - d[4] * ca, ca, sa, (d[2] - d[1]) * (d[2] + d[1]),
-        abs(d[3].real) + d[0].real, abs(d[4].real) + d[0].real, abs(d[5].real) + abs(d[4].real) + d[0].real, d[29].real,
-    )  # fmt: skip
-    cos, sin, one, two, code = rocker_angle(rocker, u, v)
-    c, s = np.cos(d[8]), np.sin(d[8])
-    x, y = d[7] * (cos * c - sin * s), d[7] * (sin * c + cos * s)
-    pin = Driven(d[3] + x, y, -(one * y), one * x, -(two * y) - one * one * x, two * x - one * one * y)
+    rocker, pin = rocker_pin(reduce_crank(d, 1.0, d[29].real), d[7], np.cos(d[8]), np.sin(d[8]), u, v)
     second = eccentric(d[9], d[10], d[11], np.cos(d[12]), np.sin(d[12]), u, v)
     third = eccentric(d[13], d[14], d[15], np.cos(d[16]), np.sin(d[16]), u, v)
-    return pin, second, third, code
+    return pin, second, third, rocker.status
 
 
 @inline
