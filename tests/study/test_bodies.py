@@ -189,7 +189,7 @@ def test_smoke_version_replaces_a_curve_key_by_key(tmp_path):
         ("[loads]\ntool_force2 = { phi = [0, 400], values = [1, 2], unit = 'N' }\n", "rising angles within one turn"),
         ("[loads]\ntool_force2 = { phi = [0, 90], unit = 'N' }\n", "loads.tool_force2.values is missing"),
         ("[loads]\ntool_force2 = { phi = [0, 9], values = [1, 2], mean = 1, unit = 'N' }\n", "allowed: one of {"),
-        ("[loads]\ntool_force2 = { mean = 1, unit = 'mm' }\n", "a force, in N or kN"),
+        ("[loads]\ntool_force2 = { mean = 1, unit = 'mm' }\n", "a force, in N, kN or lbf"),
         ("[loads]\ntool_force2 = { file = 'f.csv', unit = 'N' }\n", "a table that can be read"),
         ("[loads]\ntool_force2 = { file = '../f.csv', unit = 'N' }\n", "without a folder"),
         ("[loads]\ntool_force2 = { file = 'g.csv', columns = ['a', 'c'], unit = 'N' }\n", "columns of the file: a, b"),

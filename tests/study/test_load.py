@@ -315,8 +315,9 @@ def test_any_text_is_a_unit_or_a_fault(text: str) -> None:
     ("internal", "written"),
     [
         ("mm", "um cm m in inch"), ("rad", "deg mrad rev"), ("rad/s", "rpm deg/s rev/h"), ("s", "ms min h"),
-        ("t", "kg g"), ("N", "kN gf kg*m/s^2"), ("N*mm", "N*m kN*cm"), ("t*mm^2", "kg*m^2 g*cm^2"), ("B", "MB GB"),
-        ("MPa", "N/m^2 kN/cm^2"), ("N/mm", "N/m gf/in"), ("N*mm*s", "N*m/rpm*rev"), ("mm/s^2", "m/min^2"),
+        ("t", "kg g lb"), ("N", "kN gf lbf kg*m/s^2"), ("N*mm", "N*m kN*cm lbf*in"),
+        ("t*mm^2", "kg*m^2 g*cm^2"), ("B", "MB GB"), ("MPa", "N/m^2 kN/cm^2"),
+        ("N/mm", "N/m gf/in"), ("N*mm*s", "N*m/rpm*rev"), ("mm/s^2", "m/min^2"),
     ],
 )  # fmt: skip
 def test_factors_are_those_of_pint(internal: str, written: str) -> None:
