@@ -113,18 +113,24 @@ def _run_general(
 
 
 class _StepOutput(NamedTuple):
-    """Output of a step: outer name, name in the stage, and the pose output whose precise maximum may replace it."""
+    """Output of a step: outer name, name in the stage, and the pose output whose precise maximum may replace it.
+
+    ``maximum`` is that maximum in the stage: the output itself, or the one whose place it is.
+    """
 
     name: str
     plain: str
+    maximum: str
     pose: str
 
 
 def _step_outputs(step: Step, stage: Stage, outputs: Sequence[str]) -> tuple[_StepOutput, ...]:
-    plain = [at_stage(name, stage.tail) for name in outputs]
-    return tuple(
-        _StepOutput(name, n, _sharpened(stage.family, step, n)) for name, n in zip(outputs, plain, strict=True)
-    )
+    found = []
+    for name in outputs:
+        plain = at_stage(name, stage.tail)
+        maximum = plain.removeprefix(f"{stage.family.domain.name}_")
+        found.append(_StepOutput(name, plain, maximum, _sharpened(stage.family, step, maximum)))
+    return tuple(found)
 
 
 def _sharpened(family: Family, step: Step, name: str) -> str:
@@ -145,16 +151,18 @@ def _run_step(
     step: Step, stage: Stage, outputs: tuple[_StepOutput, ...], designs: Array, accuracy: Accuracy, window: Window
 ) -> Columns:
     part = stage.designs(designs)
-    results = step.run(part, frozenset(output.plain for output in outputs), accuracy)
+    refined = accuracy.target is not None and not accuracy.certify
+    maxima = {output.maximum: output.pose for output in outputs if output.pose and refined}
+    wanted = frozenset((*(output.plain for output in outputs), *maxima))
+    results = step.run(part, wanted, accuracy)
     if accuracy.target is not None:
-        for _, plain, pose in outputs:
+        for plain in wanted:
             if error_of(plain) not in results:  # a step either meets the target, or gives its own error
                 results[error_of(plain)] = accuracy.target * np.abs(np.asarray(results[plain], np.float64))
-            # Rounding may have left a maximum less accurate than the target.
-            if pose and not accuracy.certify:
-                sharpen_maxima(stage.family, step, part, pose, plain, results, accuracy.target)
+        for maximum, pose in maxima.items():  # rounding may have left one less accurate than the target
+            sharpen_maxima(stage.family, step, part, pose, maximum, results, accuracy.target)
     columns: Columns = {"status": results["status"]}
-    for name, plain, _ in outputs:
+    for name, plain, _, _ in outputs:
         columns[name] = results[plain]
         if error_of(plain) in results:
             columns[error_of(name)] = results[error_of(plain)]

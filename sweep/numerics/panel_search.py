@@ -31,6 +31,7 @@ EDGE = 2.0**17  # times EPS of the size: change over NARROWEST/4 of a curve with
 LEVEL = 16.0  # times EPS of a value: most by which the poses of a level curve miss the polynomial through them, 10.7
 EVEN = 6.0  # the same of one whose poses are all equal: what the claimed error of a constant leaves for it
 AGAIN = 8.0  # factor from that difference to the claimed error: poses may see only 1/8 of a kink between them
+BEND = (NODES - 1) ** 2 * ((NODES - 1) ** 2 - 1) / 3.0  # the same of the second derivative on [-1, 1]
 SLOPE = 2.0 * (NODES - 1) ** 2  # bound of the slope of a polynomial bounded by 1 on a panel of width 1 (Markov)
 
 
@@ -143,12 +144,16 @@ def _tops(panels: Panels, mode: int, err: Array) -> Top:
     series, half = panels.series[uneven], 0.5 * (panels.high - panels.low)
     x, value, blur = np.zeros(half.size), panels.peak.copy(), np.ones(half.size)
     x[uneven], value[uneven] = summits(series, mode)
-    derived = (chebyshev.chebder(series, order, axis=1).T for order in (1, 2))
-    slope, bow = (np.abs(chebyshev.chebval(x[uneven], of, tensor=False)) for of in derived)
+    derived = (chebyshev.chebder(series, order, axis=1).T for order in range(3))
+    here, slope, bow = (chebyshev.chebval(x[uneven], of, tensor=False) for of in derived)
+    falls = -(mode or np.sign(here)) * bow - BEND * err[uneven]
     # The slope bounds the error of a place at an end, the bend that of a place inside; poses avoid a jump at the end.
     inside = np.abs(x) < 1.0
-    held = np.where(inside[uneven], bow / SLOPE, slope)
+    held = np.where(inside[uneven], np.abs(bow) / SLOPE, np.abs(slope))
     blur[uneven] = np.minimum(np.divide(err[uneven], held, out=np.full(slope.size, 2.0), where=held > 0.0), 2.0)
+    # The summit of a symmetric curve may be an end: it is level there, and its bend holds it.
+    bent = np.sqrt(np.divide(2.0 * err[uneven], falls, out=np.full(slope.size, 4.0), where=falls > 0.0))
+    blur[uneven] = np.where(inside[uneven], blur[uneven], np.minimum(blur[uneven], bent))
     err_phi = half * blur + np.where(inside, 0.0, 0.5 * NARROWEST) + 8.0 * EPS * np.pi
     return Top(panels.row, 0.5 * (panels.low + panels.high) + half * x, value, err + 4.0 * EPS * np.abs(value), err_phi)
 

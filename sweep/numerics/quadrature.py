@@ -85,7 +85,7 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
     ----------
     function : the curves; a nan value ends the integration of its curve
     edges : (n, p + 1) rising edges of the first panels
-    target : error of each integral relative to the largest magnitude of its estimates
+    target : error of each integral relative to its magnitude
 
     Notes
     -----
@@ -100,7 +100,7 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
     wide = high > low
     new = _evaluated(function, row[wide], origin[wide], low[wide], high[wide])
     shape = (n, new.value.shape[1])
-    done, done_err, size = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    done, done_err = np.zeros(shape), np.zeros(shape)
     panels = new
     seen: Mask = np.ones(n, np.bool_)
     settled: Mask = np.zeros(n, np.bool_)
@@ -111,7 +111,7 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
         total, err = done.copy(), done_err.copy()
         np.add.at(total, panels.row, panels.value)
         np.add.at(err, panels.row, panels.err)
-        np.maximum(size, np.abs(total), out=size)
+        size = np.abs(total)  # of this pass: a first estimate may be many times too large
         settled = np.asarray((err <= target * size).all(axis=1))
         allowed = (target * size / np.maximum(2.0 * count, 1.0)[:, None])[panels.row]
         noisy = (panels.idle >= NOISE)[:, 0] & (panels.err <= SMALL * size[panels.row]).all(axis=1)

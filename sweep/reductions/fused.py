@@ -142,7 +142,9 @@ def extrema(
     if rounded.size:
         which, distinct = rounded // n, tuple(of_order.values())
         number = np.array([list(of_order).index(curve.order) for curve in curves])[which]
-        _confirm(distinct, number, modes[which], many, extremum, rounded, target * scale[rounded], spacing[rounded])
+        # The errors of the largest and the least value add up in a range.
+        allowed = np.where(modes[which] == 0, 1.0, 0.5) * target * scale[rounded]
+        _confirm(distinct, number, modes[which], many, extremum, rounded, allowed, spacing[rounded])
     if first.request.place:
         top = np.flatnonzero((codes == st.OK) | (codes == chains.ROUNDED))
         slope, known = first.family.derivative_of[first.request.pose], (phi[top], err_phi[top])

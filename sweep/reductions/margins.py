@@ -140,11 +140,13 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target
     phi = np.where(known, least.phi, 0.0)[:, None]
     poses, state = pose_columns(family, designs, phi, (discriminant, angle))
     at_least = DESIGN_STATUS[state[:, 0]]
+    late = (at_least == st.OK) & (unknown == st.NOT_CONVERGED)
     # A discriminant with nan in it: the status of those poses gives the reason.
     status = np.where(known, at_least, np.where(unknown == st.OK, st.NOT_CONVERGED, unknown)).astype(np.uint8)
     ended = _ended(family, designs, loop, status)
     status[ended], least.value[ended], least.err[ended] = st.NOT_ROTATABLE, np.nan, np.nan
     turns = status == st.OK
+    status[turns & late] = st.NOT_CONVERGED
     scale = loop.scale(designs)
     pressure = np.where(turns, poses[angle][:, 0], np.nan)
     err_margin = least.err / scale

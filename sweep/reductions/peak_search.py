@@ -32,6 +32,7 @@ SEARCHED = 0.25  # share of the allowed error for the search: the rest is for di
 RIVALS = 1e-3  # peaks lower than the highest by this share of the size may turn out to be the highest
 NEVER = 2**40  # more samples than are ever needed
 CLOSE = 0.1  # distance of a singularity [rad] below which the effect of rounding is measured
+ROUNDED = 64.0  # times what rounding the inputs changes: an error above that is one of the search
 TIE = 1e-10  # relative accuracy to which peaks are compared where their places are wanted
 
 
@@ -111,9 +112,14 @@ class PeakSearch:
             row, found = candidates.row[mine], only(peaks, mine)
             if self.window is not None and request.windowed:
                 row, found = self._within_window(rows, columns, request, row, found, resolved[number])
-            moved = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
+            again = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
             self.found[request].err_phi[rows[alone[number]]] = np.pi  # any angle would do
-            again = moved & resolved[number] & ~alone[number]
+            late = self._late(turn, number, scales[number], resolved[number] & ~alone[number])
+            if samples >= BREAKING and not request.windowed:
+                # Panels need a motion all over the turn, as a negative discriminant is none.
+                torn = late & ~(self.anywhere & (self.found[request].value[rows] <= 0.0))
+                self.torn[number, rows[torn]], alone[number, torn] = True, True
+            again = (again | late) & resolved[number] & ~alone[number]
             needed[number, again] = np.maximum(needed[number, again], 2 * samples)
         # Every design is sampled LIMIT times before it is given up.
         needed = np.minimum(needed, LIMIT if samples < LIMIT else 2 * LIMIT)
@@ -191,10 +197,7 @@ class PeakSearch:
             rivals, tolerance = rivals[tied], tolerance[tied]
             sample = self._sampler(self.family, turn, only(candidates, rivals))
             put(peaks, rivals, refine.sharpen(sample, only(peaks, rivals), tolerance, np.full(rivals.size, np.inf)))
-        share = self._rounding(turn, candidates, self.guards)
-        if self.near is not None:
-            near = only(self.near, turn.rows[candidates.row])
-            share += rounding.singular_share(near, peaks.phi, self._orders(candidates))
+        share = self._share(turn, candidates, peaks.phi)
         peaks = peaks._replace(err_height=peaks.err_height + share * np.abs(peaks.height))
         if self.family.precise_poses is None:
             # A quartic may fall below zero where a curve touches zero; a value at a pose is attained.
@@ -241,7 +244,9 @@ class PeakSearch:
         rivals = np.flatnonzero((peaks.height + doubt >= lowest[group]) | windowed)
         group = group[rivals]
         tied = (np.bincount(group, minlength=lowest.size)[group] > 1) & self.places(number[rivals])
-        return rivals, np.where(tied, min(self.target, TIE), self.target) * size[rivals], tied
+        # The errors of the largest and the least value add up in a range.
+        whole = np.array([1.0 if request.mode == 0 else 0.5 for request in self.requests])[number[rivals]]
+        return rivals, np.where(tied, min(self.target, TIE), whole * self.target) * size[rivals], tied
 
     def _sampler(
         self, family: Family, turn: Sampled, candidates: PeakCandidates, middle: Array | None = None
@@ -276,6 +281,29 @@ class PeakSearch:
         """Share of a value by which rounding may have changed it and its neighbours alike."""
         given = self.designs[turn.rows], turn.columns, candidates.row, candidates.column
         return rounding.rounding_share(self.family, *given, guards, self._orders(candidates))
+
+    def _share(self, turn: Sampled, candidates: PeakCandidates, phi: Array) -> Array:
+        """Share of values at the angles phi (k,) that rounding may have changed, near other singularities too."""
+        share = self._rounding(turn, candidates, self.guards)
+        if self.near is not None:
+            near = only(self.near, turn.rows[candidates.row])
+            share += rounding.singular_share(near, phi, self._orders(candidates))
+        return share
+
+    def _late(self, turn: Sampled, number: int, size: Array, which: Mask) -> Mask:
+        """Whether extrema of some designs of the block miss their target by more than rounding explains, (r,)."""
+        request, rows = self.requests[number], turn.rows
+        found = only(self.found[request], rows)
+        late: Mask = which & (found.err > self.target * size)
+        row = np.flatnonzero(late)
+        if row.size:
+            phi = found.phi[row]
+            column = np.rint(phi * (turn.samples / TWO_PI)).astype(np.int64) % turn.samples
+            here = PeakCandidates(np.full(row.size, number), row, column, np.ones(row.size))
+            off = rounding.shaken_anywhere(self.family, self.designs[rows[row]], phi, request.pose)
+            known = 2.0 * self._share(turn, here, phi) * np.abs(found.value[row]) + ROUNDED * off
+            late[row] = found.err[row] > known
+        return late
 
     def _orders(self, candidates: PeakCandidates) -> Indices:
         """Order of derivative of each candidate; a discriminant rounds like a position."""

@@ -159,9 +159,9 @@ def confirmed(
     before = peaks.height
     peaks = attained(sample, peaks, np.arange(peaks.phi.size)) if there is None else reaching(there, peaks)
     rounded = np.abs(peaks.height - before)
-    again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
     # The same rounding has moved the places; it varies along the curve, and one pose sees one value of it.
     peaks.err_height[:] += VARIES * rounded
+    again = np.flatnonzero((peaks.err_height > tolerance) | (peaks.err_phi > locate))
     if again.size:
         # Rounding may have moved the place too, which stays hidden if neighbouring poses round alike: where the height
         # has changed the search starts anew, otherwise with a window as wide as the error of the place.

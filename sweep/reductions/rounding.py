@@ -168,6 +168,7 @@ def tells(discriminant: Array) -> Mask:
 
 
 SPACING = 1.0 / 6.0  # of poses, relative to the distance of the nearest singularity
+FOLLOWED = 1e-4  # relative accuracy of a height whose place is near enough for the derivative's root to be found
 RIVAL = 0.9  # share of the highest pose above which a local maximum may turn out to be the highest
 POSES = 512  # poses per turn, roughly, that determine the size of blocks
 LEVEL = 8.0 * EPS
@@ -193,7 +194,10 @@ def sharpen_maxima(
     """
     place = f"{family.domain.name}_{name}"
     value, err = (np.asarray(columns[key], np.float64) for key in (name, f"err_{name}"))
-    wanting = np.flatnonzero(err > target * np.abs(value))
+    rough = err > target * np.abs(value)
+    found = place in columns
+    at, err_at = (np.asarray(columns[key], np.float64) for key in (place, f"err_{place}")) if found else (value, err)
+    wanting = np.flatnonzero(rough | (err_at > target) if found else rough)
     if not wanting.size:
         return
     # A larger error usually means a nearer singularity, and more poses for a block of such designs.
@@ -201,12 +205,14 @@ def sharpen_maxima(
     for rows in blocks(wanting, POSES):
         searched = step.run(designs[rows], frozenset((name, place)), Accuracy(target=target))
         phi = np.asarray(searched[place], np.float64)
-        peaks = precise_maxima(family, designs[rows], pose, phi, target, place in columns)
-        better = (peaks.err_height < err[rows]) & (peaks.height >= value[rows] - err[rows] - peaks.err_height)
-        rows, peaks = rows[better], only(peaks, better)
-        value[rows], err[rows] = peaks.height, peaks.err_height
-        if place in columns:
-            columns[place][rows], columns[f"err_{place}"][rows] = np.mod(peaks.phi, TWO_PI), peaks.err_phi
+        peaks = precise_maxima(family, designs[rows], pose, phi, min(target, FOLLOWED), found)
+        same = peaks.height >= value[rows] - err[rows] - peaks.err_height
+        if found:
+            # No bit of the value depends on whether its place is wanted, nor the other way round.
+            nearer = same & ((peaks.err_phi < err_at[rows]) | (rough[rows] & (peaks.err_height < err[rows])))
+            at[rows[nearer]], err_at[rows[nearer]] = np.mod(peaks.phi, TWO_PI)[nearer], peaks.err_phi[nearer]
+        better = same & rough[rows] & (peaks.err_height < err[rows])
+        value[rows[better]], err[rows[better]] = peaks.height[better], peaks.err_height[better]
 
 
 def precise_maxima(family: Family, designs: Array, pose: str, phi: Array, target: float, locate: bool) -> Peaks:

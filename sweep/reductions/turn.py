@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -22,6 +23,8 @@ from sweep.reductions.sampling import DESIGN_STATUS, Extremum, blocks, sample_tu
 from sweep.reductions.window import Window, window_angle
 
 Extrema: TypeAlias = dict[Request, Extremum]
+
+END_TARGET = 1e-12  # of the ends of the stroke that a window angle is measured from
 
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
@@ -78,7 +81,9 @@ def limits_and_reductions(
     """
     asked = [resolve(family, name) for name in names]
     windowed = part is not None
-    wanted = list(dict.fromkeys(r for one in asked for r in requests(family, one, windowed)))
+    angles = [(name, one) for name, one in zip(names, asked, strict=True) if isinstance(one, WindowAngle)]
+    others = [(name, one) for name, one in zip(names, asked, strict=True) if not isinstance(one, WindowAngle)]
+    wanted = list(dict.fromkeys(r for _, one in others for r in requests(family, one, windowed)))
     status = np.zeros(len(designs), np.uint8)
     found: Extrema = {}
     for position in dict.fromkeys(family.follower(r.pose) for r in wanted if r.windowed):
@@ -90,15 +95,17 @@ def limits_and_reductions(
         found, status = found | more, np.where(status == st.OK, now, status)
     more, now = _extrema(family, designs, [r for r in wanted if r not in found], accuracy, None)
     found |= more
-    columns: Columns = {"status": np.where(status == st.OK, now, status).astype(np.uint8)}
-    for name, one in zip(names, asked, strict=True):
-        if isinstance(one, WindowAngle):
-            window = _window(one.of, found, accuracy, part)
-            columns[name], columns[f"err_{name}"] = window_angle(family, designs, window)
-            continue
-        value, err_value = _value(family, designs, one, found, windowed)
-        columns[name], columns[f"err_{name}"] = value, err_value
-    return columns
+    status = np.where(status == st.OK, now, status)
+    columns: Columns = {}
+    for name, one in others:
+        columns[name], columns[f"err_{name}"] = _value(family, designs, one, found, windowed)
+    # Next to a limit position an angle changes far more than the position: these ends are found to more digits.
+    finer = accuracy if accuracy.target is None else replace(accuracy, target=min(accuracy.target, END_TARGET))
+    for name, one in angles:
+        ends, now = _extrema(family, designs, requests(family, one, windowed), finer, None)
+        status = np.where(status == st.OK, now, status)
+        columns[name], columns[f"err_{name}"] = window_angle(family, designs, _window(one.of, ends, finer, part))
+    return columns | {"status": status.astype(np.uint8)}
 
 
 def _window(position: str, found: Extrema, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:

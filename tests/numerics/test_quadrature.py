@@ -144,3 +144,19 @@ def test_where_a_function_begins_to_be_zero_is_found_to_rounding():
     place = np.random.default_rng(1).uniform(0.1, 0.9, 1000)
     found = zeros(lambda rows, x: np.minimum(x - place[rows], 0.0), np.zeros(1000), np.ones(1000))
     np.testing.assert_allclose(found, place, rtol=0.0, atol=2.0**-46)
+
+
+def test_an_error_is_relative_to_the_integral_itself():
+    """A peak at the middle of a first panel: its first estimate is many times too large, and the error was with it."""
+    width = 1e-3 * 2.0 ** -np.arange(6.0)[:, None]
+    middle = 0.5 * (EDGES[0, 0] + EDGES[0, 1])
+
+    def peaks(rows, origins, x):
+        return (1.0 + width[rows] / ((x - middle) ** 2 + width[rows] ** 2))[:, :, None]
+
+    for target in (1e-1, 1e-2, 1e-3):
+        found = integrate(peaks, np.repeat(EDGES, len(width), axis=0), target)
+        ends = np.arctan((EDGES[0, [0, -1]] - middle) / width)
+        exact = np.ptp(EDGES[0]) + ends[:, 1] - ends[:, 0]
+        assert found.settled.all() and (found.err[:, 0] <= target * found.value[:, 0]).all()
+        assert (np.abs(found.value[:, 0] - exact) <= found.err[:, 0]).all()

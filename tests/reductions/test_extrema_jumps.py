@@ -181,12 +181,16 @@ def test_an_angle_beside_a_jump_over_its_cut_converges_as_its_mirror_image_does(
         assert own.max_psi.iloc[i] - own.min_psi.iloc[i] == pytest.approx(np.ptp(psi), abs=1e-4)
 
 
+BORN_DEAD = (
+    0.9651568162379532, 1.9292332440078357, 1.7214334501208706, -0.8645343199626364, -0.42182100618150087,
+    -0.36326689004741036, 0.8990315876340816, -0.22168799026252226, 0.14593584177720245, 1.0, 1.0,
+)  # fmt: skip
+
+
 def test_panels_resolve_what_the_most_even_samples_do_not():
     """Five-links whose discriminants nearly vanish, which hardly bends the coupler's angle: they were NOT_CONVERGED."""
     matrix = np.array([
-        (0.9651568162379532, 1.9292332440078357, 1.7214334501208706, -0.8645343199626364,
-         -0.42182100618150087, -0.36326689004741036, 0.8990315876340816, -0.22168799026252226,
-         0.14593584177720245, 1.0, 1.0),
+        BORN_DEAD,
         (1.8221917079683514, 3.4732334119921315, 3.1248101364480743, -1.7603751230026785,
          -0.8064053567998615, 0.3320322946670546, 0.6488808932376903, -0.1132668371826532,
          -0.2713429003267522, 1.0, 1.0),
@@ -200,3 +204,14 @@ def test_panels_resolve_what_the_most_even_samples_do_not():
         for name, value in expected.items():
             # Between 100 000 poses a curve rises by some 1e-9 of its bend, next to the dead point by 1e-6.
             np.testing.assert_allclose(found[name], value, rtol=0.0, atol=1e-6)
+
+
+def test_a_margin_that_jumps_to_a_dead_point_is_the_limit_there():
+    """Mode 1 of this five-link begins in a dead point, next to another solution: the error was 0.01, with status 0."""
+    design = dict(zip(family("five_link").parameter_names, BORN_DEAD, strict=True))
+    for target in (1e-2, 1e-4, 1e-8):
+        found = sweep.summarise("five_link", design, ["margin", "max_pressure_angle"], accuracy=target).iloc[0]
+        assert found["status"] == st.OK
+        # A jump is located to 1e-11 rad; the angle changes by the root of the margin.
+        assert abs(found["margin"]) <= found["err_margin"] < 1e-10
+        assert abs(found["max_pressure_angle"] - 0.5 * np.pi) <= found["err_max_pressure_angle"] < 1e-5

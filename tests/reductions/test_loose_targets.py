@@ -29,6 +29,19 @@ TWO_DIPS = {
     "xi": -6.839046665790202, "eta": -0.7811563079233323, "lam": 0.8397451300468926, "h": 0.29401784723936425,
     "branch": -1.0,
 }  # fmt: skip
+LONG = {
+    "a": 1.1471701934966276, "b": 11114.580374354699, "c": 11113.16381218771, "e": 3.0067380810160604,
+    "f": 0.5070463506117875, "g": -0.41762586115294414, "alpha": 0.8572263258853945, "branch": -1.0,
+}  # fmt: skip
+# Its margin is 1e-5.
+NEARLY_DEAD = {
+    "a": 0.5965275715533184, "b": 3.495455396709518, "c": 1.834647707467162, "e": -2.0448999222820543,
+    "f": -0.2413287953942435, "g": -1.2822094271495583, "alpha": 1.4457572052019703, "branch": 1.0,
+}  # fmt: skip
+FORK = {
+    "a": 0.7323522290237172, "e": -1.368052354163477, "f": -0.282627658500458, "g": -0.14348673028358733,
+    "alpha": 1.170441950373256, "s": -0.6795948577095435, "branch": -1.0,
+}  # fmt: skip
 TURNS_BACK = {
     "P_h": 62.80629427109646, "X1": 3.0482696155355464, "Z1": 11.524173229991803, "e": 5.2750498327862525,
     "R0": 30.16817055396681, "mu1": 0.11016494344405917, "mu2": 0.10264688952140946, "A1": 8.69808430784796,
@@ -97,3 +110,34 @@ def test_rounding_at_several_poses_is_the_largest_of_each(name):
     phi, output = np.arange(PLACES)[None] * (2.0 * np.pi / PLACES), mechanism.position
     alone = [shaken(mechanism, design, one, output)[0] for one in phi.T]
     assert shaken(mechanism, design, phi, output)[0] == max(alone) > 0.0
+
+
+@pytest.mark.parametrize("target", [*LOOSE, 1e-8])
+def test_the_place_of_a_velocity_next_to_a_dead_point_is_within_the_target(target):
+    """Its error was three times 1e-2, 140 times 1e-6 and 2000 times 1e-8, and other bits came beside the value."""
+    want = ["phi_max_abs_dpsi", "max_abs_dpsi"]
+    found = sweep.summarise("rssr", NEARLY_DEAD, want, accuracy=target).iloc[0]
+    alone = sweep.summarise("rssr", NEARLY_DEAD, want[0], accuracy=target).iloc[0]
+    assert found["status"] == st.OK and alone[want[0]] == found[want[0]]
+    assert abs(found[want[0]] - 2.96440833227) <= found[f"err_{want[0]}"] + 1e-11  # as the place is written here
+    assert found[f"err_{want[0]}"] <= target
+    assert sweep.summarise("rssr", NEARLY_DEAD, want[1], accuracy=target).iloc[0][want[1]] == found[want[1]]
+
+
+@pytest.mark.parametrize("target", LOOSE)
+def test_the_place_of_a_summit_between_two_panels_is_within_its_error(target):
+    """The crank pin is farthest at 0, the end of a panel: the error was half a panel, 0.03 rad."""
+    found = sweep.summarise("slotted", FORK, "phi_max_abs_x_b", accuracy=target).iloc[0]
+    assert found["status"] == st.OK
+    # Panels place a level top by the root of the rounding of its height (docs/extrema.md).
+    assert abs(np.sin(found["phi_max_abs_x_b"])) <= found["err_phi_max_abs_x_b"] < 5e-6
+
+
+@pytest.mark.parametrize("target", [1e-6, 1e-8])
+def test_the_errors_of_both_ends_of_a_range_are_together_within_the_target(target):
+    """The rounding of long couplers moves both by nearly as much as the target allows each: they had 1.4 times it."""
+    outputs = ("psi", "y_b", "y_c", "sin_psi", "discriminant")
+    found = sweep.summarise("rssr", LONG, [f"range_{name}" for name in outputs], accuracy=target).iloc[0]
+    assert found["status"] == st.OK
+    for name in outputs:
+        assert found[f"err_range_{name}"] <= target * found[f"range_{name}"]

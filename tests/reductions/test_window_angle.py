@@ -168,3 +168,12 @@ def test_a_follower_that_stands_still_may_be_in_the_window_all_the_turn_or_never
     ]
     assert found.status == st.OK and abs(found.swing) <= found.err_swing
     assert found.err_window_angle == 2.0 * np.pi
+
+
+@pytest.mark.parametrize("window", WINDOWS)
+def test_error_is_that_of_exact_ends_at_loose_targets(window):
+    """The ends of the stroke were found to the target, which moved a stay next to them by up to fifty times as much."""
+    exact = sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-12, window=window)
+    found = sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-2, window=window)
+    assert (found.status == 0).all() and (found.err_window_angle <= 1e-8).all()
+    assert (np.abs(found.window_angle - exact.window_angle) <= found.err_window_angle).all()
