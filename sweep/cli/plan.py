@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 import numpy as np
 
+from kernels.status import NOT_CONVERGED
 from sweep.chunks.cascade import ordered_routes
 from sweep.chunks.plan import PARAMETER_UNITS, Pilot, feasible_designs, pilot, spread_designs, spread_rows
 from sweep.cli.families import aligned, main_outputs
@@ -26,7 +27,8 @@ from sweep.engine.estimate import (
     searches,
 )
 from sweep.errors import how_many
-from sweep.evaluation.summaries import output
+from sweep.evaluation.statuses import meaning
+from sweep.evaluation.summaries import design_outputs, output
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import Crossing
 from sweep.families.machines.machine import Machine
@@ -41,6 +43,7 @@ from sweep.study.space import Axis
 # Poses per design for the shares of the effects, and number of designs on which their rules are tested.
 POSES = 100.0
 ADVISED = 64
+TRIED = 12  # designs whose outputs are computed, as a design with effects may take 0.1 s
 TURN = np.arange(720.0) * (2.0 * math.pi / 720)  # crank angles at which a tool is compared with the fabric
 NAMED = 24  # largest number of uncomputed outputs that are listed
 SECONDS_PER_BOX = 20e-6  # of a proof, docs/proof.md
@@ -269,9 +272,19 @@ def _effects(study: Study, sample: Pilot) -> list[str]:
     if points := _points(study):
         lines += ["", "masses in the joints of their bodies, as centre and inertia are 0", f"  {', '.join(points)}"]
     lines += _piercing(study, designs)
+    lines += _late(study)
     rules = findings(bare, study.family, designs, study.want)
     advice = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in rules)]
     return lines + (advice if rules else [])
+
+
+def _late(study: Study) -> list[str]:
+    """Say how many of a few designs of the whole space miss the accuracy asked, as speeds do under jumping loads."""
+    designs = spread_designs(study, TRIED)
+    status = design_outputs(study.family, designs, study.want, study.accuracy, study.window)["status"]
+    late = np.count_nonzero(status == NOT_CONVERGED)
+    words = f"{late} of {how_many(len(designs), 'design')} spread over the space: {meaning(NOT_CONVERGED)}"
+    return ["", "values that miss the accuracy asked", f"  {words}"] if late else []
 
 
 def _piercing(study: Study, designs: Array) -> list[str]:

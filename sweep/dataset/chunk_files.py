@@ -139,7 +139,10 @@ def parts(folder: Path) -> list[ChunkFile]:
     strangers = [path for path in strangers if not path.name.startswith("_")]  # pandas and pyarrow ignore these
     if strangers:
         names = ", ".join(path.name for path in strangers[:3])
-        raise InputError("file", names, "chunks named part-<index>-<identity>-<hash>.parquet", str(folder))
+        allowed = "chunks named part-<index>-<identity>-<hash>.parquet"
+        if (folder / "study.toml").exists():
+            allowed += "; this is the folder of a study, and sweep run writes its dataset elsewhere"
+        raise InputError("file", names, allowed, str(folder))
     return chunks
 
 

@@ -309,3 +309,9 @@ def test_a_folder_closed_to_the_user_is_said(whole: tuple[Path, Path], dataset: 
     finally:
         dataset.chmod(0o755)
     assert done.returncode == 2 and "Traceback" not in done.stderr and "not readable" in done.stderr
+
+
+def test_the_folder_of_a_study_is_no_dataset_and_is_called_so(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text("")
+    with pytest.raises(InputError, match="this is the folder of a study"):
+        sweep.compare(tmp_path, tmp_path)

@@ -135,6 +135,13 @@ def test_fabric_that_the_needle_does_not_enter_is_named(machine: bool, at: str, 
     assert not any("pierce_at" in line for line in lines_of(sewing("max_abs_drive_torque", machine, pierce_at=at)))
 
 
+@pytest.mark.parametrize(("force", "late"), [(0, False), (200, True)])
+def test_speeds_that_a_large_piercing_force_leaves_inaccurate_are_foreseen(force: float, late: bool) -> None:
+    """The crank speed jumps with the load, and its series does not resolve that to 1e-8."""
+    lines = lines_of(sewing("unevenness", pierce_force=f"{force} N", pierce_at="-20 mm"))
+    assert any("5 of 5 designs spread over the space: the accuracy asked for" in line for line in lines) is late
+
+
 @pytest.mark.parametrize("machine", [False, True])
 @pytest.mark.parametrize(("want", "least"), [("max_abs_drive_torque", 5.0), ("unevenness", 40.0)])
 def test_estimates_know_that_a_piercing_force_makes_loads_jump(machine: bool, want: str, least: float) -> None:
