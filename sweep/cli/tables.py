@@ -32,7 +32,9 @@ WANT = click.option(
 )
 OUT = click.option("--out", type=A_FILE, help="A .parquet or .csv file; default: CSV to stdout.")
 KEEP = click.option(
-    "--keep", multiple=True, help="Columns of TABLE to repeat in the result, separated by commas; "
+    "--keep",
+    multiple=True,
+    help="Columns of TABLE to repeat in the result, separated by commas; "
     "`all` for every one but those that are named like a result.",
 )
 TEXT = click.option("--status-text", is_flag=True, help="Add a column that says in words what the status means.")
