@@ -81,9 +81,9 @@ def limits_and_reductions(
     """
     asked = [resolve(family, name) for name in names]
     windowed = part is not None
-    angles = [(name, one) for name, one in zip(names, asked, strict=True) if isinstance(one, WindowAngle)]
-    others = [(name, one) for name, one in zip(names, asked, strict=True) if not isinstance(one, WindowAngle)]
-    wanted = list(dict.fromkeys(r for _, one in others for r in requests(family, one, windowed)))
+    stays = {name: one for name, one in zip(names, asked, strict=True) if isinstance(one, WindowAngle)}
+    others = {name: one for name, one in zip(names, asked, strict=True) if name not in stays}
+    wanted = list(dict.fromkeys(r for one in others.values() for r in requests(family, one, windowed)))
     status = np.zeros(len(designs), np.uint8)
     found: Extrema = {}
     for position in dict.fromkeys(family.follower(r.pose) for r in wanted if r.windowed):
@@ -97,14 +97,14 @@ def limits_and_reductions(
     found |= more
     status = np.where(status == st.OK, now, status)
     columns: Columns = {}
-    for name, one in others:
+    for name, one in others.items():
         columns[name], columns[f"err_{name}"] = _value(family, designs, one, found, windowed)
     # Next to a limit position an angle changes far more than the position: these ends are found to more digits.
     finer = accuracy if accuracy.target is None else replace(accuracy, target=min(accuracy.target, END_TARGET))
-    for name, one in angles:
-        ends, now = _extrema(family, designs, requests(family, one, windowed), finer, None)
+    for name, stay in stays.items():
+        stroke, now = _extrema(family, designs, requests(family, stay, windowed), finer, None)
         status = np.where(status == st.OK, now, status)
-        columns[name], columns[f"err_{name}"] = window_angle(family, designs, _window(one.of, ends, finer, part))
+        columns[name], columns[f"err_{name}"] = window_angle(family, designs, _window(stay.of, stroke, finer, part))
     return columns | {"status": status.astype(np.uint8)}
 
 
