@@ -19,7 +19,7 @@ from sweep.reductions import refine, rounding, sampling
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
 from sweep.reductions.refine import PeakCandidates, Peaks, Sampler
 from sweep.reductions.resolution import MATTERS, PER_SINGULARITY, broken, denser, nearest
-from sweep.reductions.window import Window, edges
+from sweep.reductions.window import Window, peaks_within
 
 START = 32  # first number of samples
 LIMIT = 32768  # largest number of samples, after which panels are tried
@@ -111,7 +111,8 @@ class PeakSearch:
             mine = candidates.request == number
             row, found = candidates.row[mine], only(peaks, mine)
             if self.window is not None and request.windowed:
-                row, found = self._within_window(rows, columns, request, row, found, resolved[number])
+                given = self.family, self.designs, rows, self.window, columns, request
+                row, found = peaks_within(*given, row, found, resolved[number])
             again = self._keep_best(rows, request, row, found) > DISAGREEMENT * scales[number]
             self.found[request].err_phi[rows[alone[number]]] = np.pi  # any angle would do
             late = self._late(turn, number, scales[number], resolved[number] & ~alone[number])
@@ -292,15 +293,14 @@ class PeakSearch:
 
     def _late(self, turn: Sampled, number: int, size: Array, which: Mask) -> Mask:
         """Whether extrema of some designs of the block miss their target by more than rounding explains, (r,)."""
-        request, rows = self.requests[number], turn.rows
-        found = only(self.found[request], rows)
+        request, found = self.requests[number], only(self.found[self.requests[number]], turn.rows)
         late: Mask = which & (found.err > self.target * size)
         row = np.flatnonzero(late)
         if row.size:
             phi = found.phi[row]
             column = np.rint(phi * (turn.samples / TWO_PI)).astype(np.int64) % turn.samples
             here = PeakCandidates(np.full(row.size, number), row, column, np.ones(row.size))
-            off = rounding.shaken_anywhere(self.family, self.designs[rows[row]], phi, request.pose)
+            off = rounding.shaken_anywhere(self.family, self.designs[turn.rows[row]], phi, request.pose)
             known = 2.0 * self._share(turn, here, phi) * np.abs(found.value[row]) + ROUNDED * off
             late[row] = found.err[row] > known
         return late
@@ -309,20 +309,6 @@ class PeakSearch:
         """Order of derivative of each candidate; a discriminant rounds like a position."""
         orders = [0 if self.anywhere else rounding.order_of(self.family, r.pose) for r in self.requests]
         return np.array(orders)[candidates.request]
-
-    def _within_window(
-        self, rows: Indices, columns: dict[str, Array], request: Request, row: Indices, peaks: Peaks, resolved: Mask
-    ) -> tuple[Indices, Peaks]:
-        """Drop the peaks outside the window, and add its edges as candidates."""
-        assert self.window is not None
-        poses, _ = sampling.pose_columns(self.family, self.designs[rows[row]], peaks.phi[:, None], self.names)
-        inside = self.window.holds(rows[row], poses[self.window.position])[:, 0]
-        edge = edges(self.family, self.designs, rows, self.window, columns, request.pose)
-        edge = only(edge, resolved[edge.row])
-        height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
-        none = np.zeros(edge.row.size)
-        added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
-        return np.concatenate([row[inside], edge.row]), joined(only(peaks, inside), added)
 
     def _keep_best(self, rows: Indices, request: Request, row: Indices, peaks: Peaks) -> Array:
         """Store the highest candidate of each row; return its distance from the first guess (0 where none)."""

@@ -10,7 +10,9 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
 from sweep.numerics.events import zeros
-from sweep.numerics.records import Indices, Mask
+from sweep.numerics.records import Indices, Mask, joined, only
+from sweep.quantities.kinds import Request
+from sweep.reductions.refine import Peaks
 from sweep.reductions.resolution import denser
 from sweep.reductions.sampling import blocks, pose_columns, sample_turn
 
@@ -116,6 +118,29 @@ def _brackets(rows: Indices, window: Window, positions: Array) -> tuple[Indices,
         found.append((row[:count].copy(), column[:count].copy(), np.full(count, side)))
     first, second, sides = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return first, second, sides
+
+
+def peaks_within(
+    family: Family, designs: Array, rows: Indices, window: Window, columns: dict[str, Array], request: Request,
+    row: Indices, peaks: Peaks, resolved: Mask,
+) -> tuple[Indices, Peaks]:  # fmt: skip
+    """Drop the peaks of a block outside the window, and add its edges as candidates.
+
+    Parameters
+    ----------
+    family, designs, rows, window, columns : as of `edges`
+    request : the extremum of a pose output
+    row, peaks : (k,) designs of the peaks in the block, and the peaks
+    resolved : (r,) designs whose edges count
+    """
+    poses, _ = pose_columns(family, designs[rows[row]], peaks.phi[:, None], list(columns))
+    inside = window.holds(rows[row], poses[window.position])[:, 0]
+    edge = edges(family, designs, rows, window, columns, request.pose)
+    edge = only(edge, resolved[edge.row])
+    height = np.abs(edge.values) if request.mode == 0 else request.mode * edge.values
+    none = np.zeros(edge.row.size)
+    added = Peaks(edge.phi, height, none + 8.0 * EPS, edge.err, height, none, none)
+    return np.concatenate([row[inside], edge.row]), joined(only(peaks, inside), added)
 
 
 SAMPLES, MOST = 512, 16384  # first number of samples, and the largest one where a level may be passed twice between two
