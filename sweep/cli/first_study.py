@@ -95,29 +95,23 @@ def smoke_text(family: Family) -> str:
     few = {"count": 2}
     design: dict[str, Any] = dict.fromkeys(swept_names(family), few)
     if isinstance(family, Machine):
-        swept = {m.name: _swept_of(family, m.name) for m in family.members}
-        design = {name: dict.fromkeys(names, few) for name, names in swept.items() if names}
+        design = {name: dict.fromkeys(names, few) for name, names in _swept_of(family).items()}
     return f"# The same question with few designs.\n{toml({'design': design})}"
 
 
 def _machine_text(name: str, machine: Machine, schema: str) -> str:
     """Return the study of several mechanisms on one shaft, with one dimension of two of them swept."""
     wanted = {m.name: wanted_outputs(m.family)[-OF_EACH:] for m in machine.members}
-    members = {
-        m.name: {
-            "title": m.family.title,
-            "mechanism": mechanism_line(m.family),
-            "design": list(design_lines(m.family, _swept_of(machine, m.name))),
-            "limits": limit_lines(m.family),
-        }
-        for m in machine.members
-    }
     last, relations = machine.members[-1].name, _relations(machine)
     text = rendered(
         "first_machine.toml.j2",
         name=name,
         schema=schema,
-        members=members,
+        members=machine.members,
+        swept=_swept_of(machine),
+        mechanism_line=mechanism_line,
+        design_lines=design_lines,
+        limit_lines=limit_lines,
         apart=APART,
         relations=[line for line, _ in relations],
         wanted=json.dumps(
@@ -129,10 +123,9 @@ def _machine_text(name: str, machine: Machine, schema: str) -> str:
     return f"{text}\n"
 
 
-def _swept_of(machine: Machine, member: str) -> list[str]:
-    """Return the swept parameters of a member: one dimension for each of the first two members."""
-    families = {m.name: m.family for m in machine.members[:2]}
-    return swept_names(families[member])[:1] if member in families else []
+def _swept_of(machine: Machine) -> dict[str, list[str]]:
+    """Return the swept parameters of the first two members, one dimension each."""
+    return {m.name: swept_names(m.family)[:1] for m in machine.members[:2]}
 
 
 def _relations(machine: Machine) -> list[tuple[str, str]]:

@@ -35,7 +35,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.names import parts, without_minus
 from sweep.jobs.progress import Phases
 from sweep.report.quantities import number, quantity
-from sweep.report.tables import bound_words
+from sweep.report.tables import accuracy_words, bound_words
 from sweep.study import Study, load_study
 from sweep.study.loads import speeds
 from sweep.study.space import Axis
@@ -180,7 +180,8 @@ def _computed(study: Study) -> list[str]:
         shown = quantity(limit.output, output(study.family, limit.output).unit)
         limits.setdefault(limit.output, []).append(bound_words(limit, shown))
     selected, rows = ordered_routes(study), list[tuple[str, str, str]]()
-    lines = ["", f"will be computed, {_accuracy(study)}; only designs within the limits so far go on to the next line"]
+    between = "only designs within the limits so far go on to the next line"
+    lines = ["", f"will be computed, extrema {accuracy_words(study)}; {between}"]
     for k, route in enumerate(selected, 1):
         outputs = ", ".join(
             name + (f" ({' and '.join(limits[name])})" if name in limits else "") for name in route.outputs
@@ -328,14 +329,6 @@ def _axis(axis: Axis) -> str:
     low, high = axis.low / axis.factor, axis.high / axis.factor
     count = "" if axis.values is None else f", {how_many(axis.count, 'value')}"
     return f"{low:g} to {high:g}{unit}{count}{', log' if axis.scale == 'log' else ''}"
-
-
-def _accuracy(study: Study) -> str:
-    if study.accuracy.target is not None:
-        of = f" of {', '.join(study.accuracy.proven)}" if study.accuracy.proven else ""
-        proof = f", with the proof that no peak{of} is missed" if study.accuracy.certify else ""
-        return f"extrema to a relative error of {study.accuracy.target:g}{proof}"
-    return f"extrema on a grid of {study.accuracy.samples} crank angles"
 
 
 def size(count: float) -> str:

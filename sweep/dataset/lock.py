@@ -64,19 +64,11 @@ def held(folder: Path, file: Path, taken: Callable[[], str]) -> Iterator[None]:
     LockedError, StoreError
         as for :func:`locked`.
     """
-    with store_errors(folder):
-        lock = _acquired(folder, file, taken)
-        try:
-            descriptor = _hold(folder, taken)
-        except BaseException:
-            lock.release()
-            raise
-    try:
+    with contextlib.ExitStack() as locks:
+        with store_errors(folder):
+            locks.callback(_acquired(folder, file, taken).release)
+            _hold(folder, taken, locks)
         yield
-    finally:
-        if descriptor is not None:
-            os.close(descriptor)
-        lock.release()
 
 
 def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLock:
@@ -101,22 +93,17 @@ def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLoc
     return lock
 
 
-def _hold(folder: Path, taken: Callable[[], str]) -> int | None:
-    """Lock the folder itself and return its descriptor; None where the system cannot lock folders."""
-    try:
-        import fcntl
-    except ImportError:  # Windows
-        return None
+def _hold(folder: Path, taken: Callable[[], str], locks: contextlib.ExitStack) -> None:
+    """Lock the folder itself until ``locks`` ends; nothing where the system cannot lock folders."""
+    from filelock import lock_descriptor
+
+    if os.name == "nt":  # Windows opens no folders
+        return
     descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        raise LockedError(f"{folder}: {taken()}") from None
-    except OSError:  # network file systems lock files only
-        os.close(descriptor)
-        return None
-    return descriptor
+    locks.callback(os.close, descriptor)
+    with contextlib.suppress(OSError):  # network file systems lock files only
+        if not lock_descriptor(descriptor, blocking=False):
+            raise LockedError(f"{folder}: {taken()}")
 
 
 def _holder(folder: Path) -> str:

@@ -15,7 +15,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -181,10 +181,6 @@ class KernelStep:
     """Compiles or loads a study's kernels by number: those of each step of its sweep, then of its descents."""
 
     study: Study
-
-    def __getstate__(self) -> dict[str, Any]:
-        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
-        return {"study": replace(self.study)}
 
     @property
     def count(self) -> int:

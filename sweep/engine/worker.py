@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from sweep.chunks import plan as plans
 from sweep.chunks.cascade import Dropped
@@ -41,10 +40,6 @@ class ChunkTask:
     plan: plans.Plan
     folder: Path
     known: Path | None = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        # A study remembers its family, which is made of functions; whoever unpickles it makes its own.
-        return self.__dict__ | {"study": replace(self.study)}
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> Done:
         """Compute and write a chunk by its index, unless ``should_stop`` returns true before it is ready."""

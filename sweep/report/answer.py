@@ -153,15 +153,13 @@ def shortest_link(data: Dataset) -> list[str]:
 
 def share_words(share: float, wanted_yield: float | None, ended: str, agree: int = 1) -> str:
     """Describe the yield of manufactured mechanisms, the wanted yield, and why the wanted one was not reached."""
-    if wanted_yield is None or share >= wanted_yield:
-        text = f"{100.0 * share:.1f} % within all limits"
-    else:
-        text = f"{math.floor(1e4 * share) / 1e2:.2f} % within all limits"
+    text = f"{100.0 * share:.1f} % within all limits"
     if wanted_yield is None:
         return text
-    text += f", {100.0 * wanted_yield:g} % asked"
     if share < wanted_yield:
-        return f"{text}: not reached{', its search used up its evaluations before' if ended == 'looks' else ''}"
+        text = f"{math.floor(1e4 * share) / 1e2:.2f} % within all limits, {100.0 * wanted_yield:g} % asked: not reached"
+        return f"{text}, its search used up its evaluations before" if ended == "looks" else text
+    text += f", {100.0 * wanted_yield:g} % asked"
     return f"{text}, met by {agree} searches" if agree > 1 else text
 
 

@@ -56,9 +56,8 @@ def limit_state(
     """
     value, other = value_of(row, limit.output), value_of(reference, limit.output)
     if is_flag(limit.output):
-        words = {1.0: "yes", 0.0: "no"}
         state = "unknown" if math.isnan(value) else "met" if meets(limit, np.array([value]))[0] else "missed"
-        return LimitState(shown, bound_words(limit, shown), words.get(value, "–"), words.get(other, "–"), "", state)
+        return LimitState(shown, bound_words(limit, shown), _yes(value), _yes(other), "", state)
     size = compared(limit.output, value)
     low, high = limit.ends
     room, bound = min((size - low, low), (high - size, high), key=lambda pair: pair[0])
@@ -280,14 +279,17 @@ def provenance(data: Dataset) -> list[tuple[str, str]]:
     """Return the data needed to reproduce the dataset."""
     rows = [("study", data.study.name), ("fingerprint of the study", data.study.fingerprint)]
     rows += [(key, str(data.plan[key])) for key in ("code", "identity", "designs", "chunks") if key in data.plan]
-    accuracy = data.study.accuracy
-    if accuracy.target is not None:
-        of = f" of {', '.join(accuracy.proven)}" if accuracy.proven else ""
-        proof = f", no peak{of} missed: proven" if accuracy.certify else ""
-        rows.append(("extrema over the turn", f"refined, relative error {number(accuracy.target, 2)}{proof}"))
-    else:
-        rows.append(("extrema over the turn", f"on a grid of {accuracy.samples} crank angles"))
-    return rows + run_rows(data.runs)
+    return [*rows, ("extrema over the turn", accuracy_words(data.study)), *run_rows(data.runs)]
+
+
+def accuracy_words(study: Study) -> str:
+    """Say how exact the extrema of a study are."""
+    accuracy = study.accuracy
+    if accuracy.target is None:
+        return f"on a grid of {accuracy.samples} crank angles"
+    of = f" of {', '.join(accuracy.proven)}" if accuracy.proven else ""
+    proof = f", with the proof that no peak{of} is missed" if accuracy.certify else ""
+    return f"to a relative error of {accuracy.target:g}{proof}"
 
 
 def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:

@@ -20,8 +20,14 @@ from sweep.study.limits import read_limits
 from sweep.study.loads import Inputs, check_unused, read_inputs, read_window, speeds, tables_of_inputs, with_effects
 from sweep.study.locus import RATIOS, read_fit, read_locus
 from sweep.study.mechanism import flattened, read_mechanism
-from sweep.study.objective import check_goal, check_objective, check_steady, read_pareto
-from sweep.study.optimise import check_search, read_optimise
+from sweep.study.objective import (
+    check_goal,
+    check_objective,
+    check_search,
+    check_steady,
+    read_optimise,
+    read_pareto,
+)
 from sweep.study.parameter import Entry
 from sweep.study.report import check_report
 from sweep.study.study import (

@@ -1,22 +1,22 @@
-"""[objective] and [pareto]: the output to be minimised or maximised, and the second output of the front."""
+"""[objective], [optimise] and [pareto]: what is minimised or maximised, how it is searched, and against what."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
+from sweep.families.chain import driven_guide
 from sweep.families.names import negative, without_minus
 from sweep.quantities.limits import Limit
 from sweep.quantities.measures import measure
 from sweep.quantities.resolve import output
-from sweep.study.file import Faults, Key, Seconds, Section, StudyFile, holds
+from sweep.study.file import Faults, Key, Seconds, Section, Seed, Share, StudyFile, holds
 from sweep.study.limits import read_output_name
-from sweep.study.optimise import OptimiseSection
 from sweep.study.parameter import read_entry
 from sweep.study.space import Axis
-from sweep.study.study import ParetoSettings
+from sweep.study.study import OptimiseSettings, ParetoSettings, ProveSettings
 
 
 class ObjectiveSection(Section):
@@ -94,6 +94,46 @@ def _jumps(family: Family, name: str) -> bool:
         return output(family, name).jumps
     except InputError:  # an unknown name is reported where it stands
         return False
+
+
+class ProveTable(Section):
+    """Table ``optimise.prove``."""
+
+    gap: Share = holds('a share as a text, as "1 %"', 0.01, json_schema_extra={"default": "1 %"})
+    boxes: int = holds("a whole number, 64 to 10^9", 1_000_000, ge=64, le=10**9)
+    smallest: Share = holds(
+        'a share of every range as a text, as "0.1 %"', 1e-7, json_schema_extra={"default": "0.00001 %"}
+    )
+    time: Seconds | None = holds('a time as a text, as "60 s"')
+
+
+class OptimiseSection(Section):
+    """Table [optimise]."""
+
+    starts: int = holds("a whole number, 1 to 100000", 20, ge=1, le=100_000)
+    seed: Seed = holds("a whole number, 0 or greater", 0)
+    unseen: Share | None = holds('a share as a text, as "2 %"')
+    looks: int = holds("a whole number, 100 to 10000000", 20_000, ge=100, le=10_000_000)
+    time_budget: Seconds | None = holds('a time as a text, as "60 s"')
+    variables: Literal["parameters", "locus"] | None = holds('"parameters" or "locus"')
+    globally: Literal["none", "proportions"] = holds('"none" or "proportions"', "none", alias="global")
+    populations: int = holds("a whole number, 1 to 10000", 40, ge=1, le=10_000)
+    prove: ProveTable | None = holds('{ gap = "1 %", boxes = 1000000, time = "10 min" }')
+
+
+def read_optimise(section: OptimiseSection) -> OptimiseSettings:
+    """Return the settings of the search."""
+    table = section.prove
+    prove = None if table is None else ProveSettings(table.gap, table.boxes, table.smallest, table.time)
+    return OptimiseSettings(**section.model_dump(exclude={"prove"}), prove=prove)
+
+
+def check_search(section: OptimiseSection, file: StudyFile, bare: Family) -> None:
+    """Report a search over a missing locus, or over proportions of a mechanism without linear variables."""
+    if section.variables == "locus" and file.free_table("locus") is None:
+        file.faults.value(("optimise", "variables"), "locus", '"parameters", or a table [locus]')
+    if section.globally == "proportions" and driven_guide(bare) is None:
+        file.faults.value(("optimise", "global"), "proportions", '"none", or the chain ["rssr", "guide"]')
 
 
 MOST_BOUNDS = 64

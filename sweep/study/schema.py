@@ -14,10 +14,9 @@ from sweep.effects import input_names
 from sweep.families import NAMES, family
 from sweep.families.base import Family, Parameter
 from sweep.quantities.units import example, internal_unit
-from sweep.study.cyclogram import StrokeSection
 from sweep.study.design import FROM, HASH, SampleTable
 from sweep.study.file import Section
-from sweep.study.limits import LimitEntry
+from sweep.study.limits import LimitEntry, StrokeSection
 from sweep.study.parameter import FixedEntry, ListEntry, RangeEntry
 from sweep.study.tables import REQUIRED_TABLES, TABLES
 

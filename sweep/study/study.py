@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -166,6 +166,10 @@ class Study:
     output: OutputSettings
     budget: Budget
     data: dict[str, Any]
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What it remembers is made of functions: whoever unpickles a study makes its own family.
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @property
     def written(self) -> dict[str, Any]:

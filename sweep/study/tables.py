@@ -12,8 +12,7 @@ from sweep.study.file import Section, StudyFile, read_table
 from sweep.study.loads import CurveSection, SceneSection
 from sweep.study.locus import FitSection
 from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection, ShaftSection, ToolSection
-from sweep.study.objective import ObjectiveSection, ParetoSection
-from sweep.study.optimise import OptimiseSection
+from sweep.study.objective import ObjectiveSection, OptimiseSection, ParetoSection
 from sweep.study.report import BudgetSection, OutputSection, ReportSection, StudySection
 from sweep.study.thread import ThreadSection
 from sweep.study.tolerance import ToleranceSection
