@@ -6,6 +6,7 @@ import difflib
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -299,6 +300,14 @@ def number(name: str, value: Any, place: str, allowed: str = "a finite number") 
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise InputError(name, value, allowed, place)
     return float(value)
+
+
+def whole(name: str, value: Any, place: str, least: int, most: int | None = None) -> int:
+    """Return a user's whole number; raise unless it lies between ``least`` and ``most``, which may be missing."""
+    fits = isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= least
+    if not fits or (most is not None and int(value) > most):
+        raise InputError(name, value, f"a whole number from {least}{'' if most is None else f' to {most}'}", place)
+    return int(value)
 
 
 def sign(name: str, value: Any, place: str, words: str) -> int:

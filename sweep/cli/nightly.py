@@ -7,10 +7,9 @@ from pathlib import Path
 import click
 
 from sweep.cli.options import A_FOLDER, BACKEND, IS_THERE, JOBS
-from sweep.errors import InputError
 from sweep.nights import Settings
 from sweep.nights import nightly as run_night
-from sweep.quantities.units import read
+from sweep.quantities.units import one_value
 
 
 @click.command()
@@ -44,10 +43,7 @@ def nightly(
     Ends with 0 if nothing changed, 11 if rows or statuses changed, 10 if values did, 124 if the time was over, 12 if a
     study was slower twice in a row, 74 if the disk refused; with a study's own code if its run failed.
     """
-    try:
-        seconds = read(budget, "s")
-    except ValueError as error:
-        raise InputError("--budget", budget, f"a time such as 6h or 90 min ({error})", "nightly") from None
+    seconds = one_value(budget, "s", "--budget", "nightly")
     settings = Settings(into, seconds, keep, jobs, backend, smoke, on_change)
     record = run_night(studies, settings, click.echo)
     click.get_current_context().exit(record.exit_code)

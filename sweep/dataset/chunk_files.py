@@ -284,6 +284,6 @@ def named_counts(counts: Mapping[int, int]) -> dict[str, int]:
     return {STATUS_NAMES.get(code, str(code)): number for code, number in sorted(counts.items())}
 
 
-def units_of(schema: pa.Schema) -> dict[str, str]:
-    """Units of a chunk's columns, from the metadata of the fields that have one."""
-    return {field.name: field.metadata[b"unit"].decode() for field in schema if b"unit" in (field.metadata or {})}
+def noted(schema: pa.Schema, key: bytes = b"unit") -> dict[str, str]:
+    """Units or definitions of columns, from the metadata of the fields that have one."""
+    return {field.name: field.metadata[key].decode() for field in schema if key in (field.metadata or {})}

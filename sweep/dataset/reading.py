@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.dataset import chunk_files
-from sweep.errors import InputError, StoreError, nearest
+from sweep.errors import InputError, StoreError, nearest, whole
 from sweep.quantities.limits import compared
 
 if TYPE_CHECKING:
@@ -81,8 +81,7 @@ def best(folder: str | Path, output: str, count: int = 10) -> pd.DataFrame:
     InputError, StoreError
         as :func:`scan`; also for an unknown output or a count out of range.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_BEST:
-        raise InputError("count", count, f"a whole number from 1 to {MOST_BEST}", "best")
+    whole("count", count, "best", 1, MOST_BEST)
 
     def first(rows: pd.DataFrame) -> NDArray[np.intp]:
         order: NDArray[np.intp] = np.argsort(compared(output, rows[output].to_numpy()), kind="stable")
@@ -166,7 +165,7 @@ def _chosen(
 
 def _with_units(rows: pd.DataFrame, source: Any) -> pd.DataFrame:
     """Attach the units in the schema to the rows."""
-    rows.attrs["units"] = chunk_files.units_of(source.schema)
+    rows.attrs["units"] = chunk_files.noted(source.schema)
     return rows
 
 
@@ -191,8 +190,7 @@ def histogram(
     InputError, StoreError
         as :func:`scan`; also for an unknown output, or where no design within the limits has a value.
     """
-    if isinstance(bins, bool) or not isinstance(bins, int) or not 1 <= bins <= MOST_BINS:
-        raise InputError("bins", bins, f"a whole number from 1 to {MOST_BINS}", "histogram")
+    whole("bins", bins, "histogram", 1, MOST_BINS)
     source = scan(folder)
     _check_outputs(source, [output], "histogram")
     low, high = _ends(source, output) if ends is None else ends

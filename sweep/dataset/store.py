@@ -166,7 +166,7 @@ def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
         text += f" (the first is {missing[0]}); run the study again to have them computed"
         warnings.warn(text, IncompleteWarning, stacklevel=2)
     rows: pd.DataFrame = pa.concat_tables(tables).to_pandas()
-    unit_of = chunk_files.units_of(tables[0].schema)
+    unit_of = chunk_files.noted(tables[0].schema)
     if units:
         rows = rows.rename(
             columns={name: f"{name} [{unit}]" for name, unit in unit_of.items() if unit not in ("", "1")}

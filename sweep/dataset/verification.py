@@ -17,7 +17,7 @@ from sweep.chunks.chunk import compute_chunk
 from sweep.chunks.parameters import parameter_matrix
 from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import TABLES, altered
-from sweep.errors import InputError, LinksweepError, StoreError, how_many
+from sweep.errors import InputError, LinksweepError, StoreError, how_many, whole
 from sweep.families.base import Columns
 from sweep.families.names import is_error
 from sweep.study import Study
@@ -121,8 +121,7 @@ def verify(folder: str | Path, designs: int = DEFAULT_DESIGNS) -> Verification:
     >>> found.exit_code, found.lines()[1]
     (0, '4 designs computed again')
     """
-    if isinstance(designs, bool) or not isinstance(designs, int) or designs < 0:
-        raise InputError("designs", designs, "a whole number from 0", "verify")
+    whole("designs", designs, "verify", 0)
     place = files.located(folder)
     plan = files.read_plan(place)
     chunks, strangers = chunk_files.listing(place)

@@ -10,7 +10,7 @@ from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import link_or_copy
 from sweep.dataset.lock import locked
 from sweep.engine.opening import open_plan, plan_note
-from sweep.errors import InputError
+from sweep.errors import InputError, whole
 from sweep.study import load_study
 
 PARTS = "parts"
@@ -42,8 +42,7 @@ def split(study: str | Path, out: str | Path, parts: int, *, smoke: bool = False
     LockedError, StoreError
         if a run is at work in ``out``, or the disk refuses.
     """
-    if isinstance(parts, bool) or not isinstance(parts, int) or not 1 <= parts <= MOST_PARTS:
-        raise InputError("parts", parts, f"a whole number from 1 to {MOST_PARTS}", "split")
+    whole("parts", parts, "split", 1, MOST_PARTS)
     model, folder = load_study(study, smoke=smoke), files.located(out)
     with locked(folder):
         plan = open_plan(model, folder, force=False)

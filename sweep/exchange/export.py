@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from sweep.dataset.files import replacing
-from sweep.errors import InputError
+from sweep.errors import InputError, whole
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.poses import evaluate
@@ -161,8 +161,7 @@ def export(
     kind = _format(target, format)
     if unit not in METRES:
         raise InputError("unit", unit, "mm or m", "export")
-    if not isinstance(poses, int | np.integer) or not 3 <= poses <= MOST_POSES:
-        raise InputError("poses", poses, f"a whole number, at least 3, at most {MOST_POSES}", "export")
+    whole("poses", poses, "export", 3, MOST_POSES)
     speed = speed_given(speed)
     if speed is not None and not (math.isfinite(speed) and speed > 0.0):
         raise InputError("speed", speed, "a positive number of rad/s", "export")

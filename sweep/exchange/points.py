@@ -22,7 +22,7 @@ from sweep.families.base import Array, Family
 from sweep.families.capabilities import FittedPose, Hardpoints
 from sweep.families.hardpoints import size
 from sweep.families.parts import Placement, vector
-from sweep.quantities.units import UnitFault, factor
+from sweep.quantities.units import UnitFault, factor, heading_factor
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -261,12 +261,9 @@ def _in_mm(table: pd.DataFrame, file: Path, scale: float) -> pd.DataFrame:
         table[axis] = factors * numbers(table[axis], axis, f"{file}, row")
     for heading in list(table.columns):
         match = _HEADED.fullmatch(heading)
-        if match is None:
-            continue
-        try:
-            table[match[1]] = factor(match[2].strip(), "mm") * numbers(table.pop(heading), heading, f"{file}, row")
-        except UnitFault as fault:
-            raise InputError("column", heading, str(fault), str(file)) from None
+        if match is not None:
+            in_mm = heading_factor(match[1], match[2].strip(), "mm")
+            table[match[1]] = in_mm * numbers(table.pop(heading), heading, f"{file}, row")
     return table
 
 

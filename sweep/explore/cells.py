@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.dataset.reading import of_number, scan
-from sweep.errors import InputError
+from sweep.errors import InputError, whole
 from sweep.explore.hand import Hand
 from sweep.families.base import Array
 from sweep.quantities.limits import compared
@@ -50,8 +50,7 @@ def cells(
     """
     if hand.folder is None:
         raise InputError("designs", "none", "the folder of a run: sweep explore results/NAME/designs", "explore")
-    if not 1 <= bins <= MOST_BINS:
-        raise InputError("bins", bins, f"1 to {MOST_BINS}", "explore")
+    whole("bins", bins, "explore", 1, MOST_BINS)
     objective = hand.study.objective
     merit = objective.output if objective is not None else "design"
     names = dict.fromkeys([*chain.from_iterable(pairs), *ranges])

@@ -11,7 +11,7 @@ from typing import Any
 
 from kernels import status as codes
 from sweep.chunks.plan import PARAMETER_UNITS
-from sweep.errors import InputError, choices
+from sweep.errors import InputError, known_keys, number
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Family, Parameter
 from sweep.families.machines.machine import Machine
@@ -118,12 +118,8 @@ class Hand:
         """
         if not isinstance(given, Mapping):
             raise InputError("design", given, "dimensions by their names", "explore")
-        for name, value in given.items():
-            if name not in self.first:
-                raise InputError("dimension", name, choices(name, self.first), "explore")
-            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-                raise InputError(name, value, "a finite number", "explore")
-        design = {**self.first, **{name: float(value) for name, value in given.items()}}  # type: ignore[arg-type]
+        known_keys(given, [*self.first], "explore", "a dimension: ")
+        design = {**self.first, **{name: number(name, value, "explore") for name, value in given.items()}}
         try:
             design_matrix(self.family, design)
         except InputError as error:  # the page has no columns and rows

@@ -5,6 +5,7 @@ It stores nothing about its visitors: a request contains its designs, so any num
 
 from __future__ import annotations
 
+import asyncio
 import json
 import secrets
 import socket
@@ -133,6 +134,7 @@ class Server:
 
     async def _improve(self, request: Request) -> Response:
         """Search while the page is connected; a page that disconnects stops its own search only."""
+        from starlette.concurrency import run_in_threadpool
         from starlette.responses import StreamingResponse
 
         body = await _json_body(request)
@@ -145,23 +147,14 @@ class Server:
             return stop.is_set()
 
         async def words() -> AsyncIterator[str]:
-            import anyio
-
-            begun, result = time.monotonic(), {}
-
-            async def work() -> None:
-                try:
-                    result.update(await anyio.to_thread.run_sync(improve, problem, design, is_over))
-                except LinksweepError as error:
-                    result["error"] = str(error)
-
+            begun, work = time.monotonic(), asyncio.create_task(run_in_threadpool(improve, problem, design, is_over))
             try:
-                async with anyio.create_task_group() as group:
-                    group.start_soon(work)
-                    while not result:
-                        yield json.dumps({"looks": counted[0], "seconds": time.monotonic() - begun}) + "\n"
-                        await anyio.sleep(PULSE)
-                yield json.dumps(result) + "\n"
+                while not work.done():
+                    yield json.dumps({"looks": counted[0], "seconds": time.monotonic() - begun}) + "\n"
+                    await asyncio.wait([work], timeout=PULSE)
+                yield json.dumps(await work) + "\n"
+            except LinksweepError as error:
+                yield json.dumps({"error": str(error)}) + "\n"
             finally:
                 stop.set()
 

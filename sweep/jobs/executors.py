@@ -18,7 +18,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
-from sweep.errors import InputError, WorkerDied, nearest
+from sweep.errors import InputError, WorkerDied, nearest, whole
 from sweep.jobs.cluster import Dask
 from sweep.jobs.signals import Stop, depend_on_parent, unheard
 
@@ -199,8 +199,7 @@ def executor(name: str, jobs: int) -> Executor:
         raise InputError("backend", name, f"{' or '.join(EXECUTORS)}{nearest(kind, EXECUTORS)}", "run")
     if equals and (kind not in ADDRESSED or not address):
         raise InputError("backend", name, f"an address after {' or '.join(f'{one}=' for one in ADDRESSED)} only", "run")
-    if isinstance(jobs, bool) or not isinstance(jobs, int) or not 1 <= jobs <= MOST_JOBS:
-        raise InputError("jobs", jobs, f"a whole number from 1 to {MOST_JOBS}", "run")
+    whole("jobs", jobs, "run", 1, MOST_JOBS)
     if equals:
         return EXECUTORS[kind](address)
     return Here() if jobs == 1 else EXECUTORS[kind]()

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sweep.dataset import files, store
@@ -49,24 +49,22 @@ def studies_in(places: Iterable[Path], smoke: bool) -> list[StudyEntry]:
     """
     places = list(places)
     selected: list[StudyEntry] = []
-    broken: list[tuple[int, Path, str]] = []
     for path in [path for place in places for path in files_of(place)]:
         try:
             study = load_study(path, smoke=smoke)
         except (LinksweepError, OSError) as error:
-            broken.append((len(selected) + len(broken), path, str(error)))
+            selected.append(StudyEntry("", path, None, str(error)))
             continue
         twin = next((other for other in selected if other.name == study.name), None)
         if twin is not None:
             raise InputError("study", study.name, f"one study of a name, {twin.path} has it already", str(path))
         selected.append(StudyEntry(study.name, path, study))
-    for place, path, fault in broken:
-        name = free = path.parent.name if path.name == FILE else path.stem
-        count = 1
-        while free in [one.name for one in selected]:
-            count += 1
-            free = f"{name}-{count}"
-        selected.insert(place, StudyEntry(free, path, None, fault))
+    for k, one in enumerate(selected):
+        if one.study is None:
+            name = one.path.parent.name if one.path.name == FILE else one.path.stem
+            names = (name, *(f"{name}-{count}" for count in range(2, len(selected) + 2)))
+            taken = [other.name for other in selected]
+            selected[k] = replace(one, name=next(free for free in names if free not in taken))
     if not selected:
         raise InputError("studies", ", ".join(map(str, places)), f"study files, or folders with a {FILE}", "nightly")
     return selected

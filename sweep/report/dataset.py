@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -164,6 +164,8 @@ def read_dataset(folder: Path) -> Dataset:
     InputError
         if the folder is no complete dataset.
     """
+    import pyarrow.parquet as pq
+
     folder = files.located(folder)
     plan = files.trusted_plan(folder)
     if plan is None:
@@ -180,7 +182,11 @@ def read_dataset(folder: Path) -> Dataset:
     chunks = chunk_files.parts(folder)
     chunk_files.check_columns(chunks)
     parts = tuple(part.path for part in chunks)
-    units, definitions = field_metadata([path for path in (*parts[:1], optima, curves, front) if path.exists()])
+    schemas = [pq.read_schema(path) for path in (front, curves, optima, *parts[:1]) if path.exists()]
+    units, definitions = (
+        {name: text for schema in schemas for name, text in chunk_files.noted(schema, key).items()}
+        for key in (b"unit", b"definition")
+    )
     return Dataset(
         folder=folder,
         plan=plan,
@@ -222,22 +228,6 @@ def _absent(study: Study, known: Container[str]) -> dict[str, float]:
     # In a dataset of an earlier version an option of later versions was not used.
     defaults = {p.name: 0.0 if p.unless else p.default for p in study.family.parameters if p.name not in known}
     return {name: value for name, value in defaults.items() if value is not None}
-
-
-def field_metadata(files: Sequence[Path]) -> tuple[dict[str, str], dict[str, str]]:
-    """Return units and definitions from the schemas of Parquet files."""
-    import pyarrow.parquet as pq
-
-    units: dict[str, str] = {}
-    definitions: dict[str, str] = {}
-    for file in files:
-        for column in pq.read_schema(file):
-            about = column.metadata or {}
-            if b"unit" in about:
-                units.setdefault(column.name, about[b"unit"].decode())
-            if b"definition" in about:
-                definitions.setdefault(column.name, about[b"definition"].decode())
-    return units, definitions
 
 
 ROLES = ("optimum", "reference", "best")

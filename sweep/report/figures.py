@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -35,15 +35,11 @@ MARKS: dict[str, dict[str, Any]] = {
 }
 
 
-@contextmanager
-def house_style() -> Iterator[None]:
+def house_style() -> AbstractContextManager[None]:
     """Draw in the report's style without changing the caller's settings."""
-    import matplotlib as mpl
     from matplotlib import style
 
-    with mpl.rc_context():
-        style.use(TEMPLATES / "report.mplstyle")
-        yield
+    return style.context(TEMPLATES / "report.mplstyle")
 
 
 def new_figure(width: float, height: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
