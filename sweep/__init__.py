@@ -6,51 +6,30 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from sweep._kernels import check_kernels
-from sweep.errors import IncompleteWarning, InputError, LinksweepError, LinksweepWarning, StudyError
+from sweep.errors import IncompleteWarning as IncompleteWarning
+from sweep.errors import InputError as InputError
+from sweep.errors import LinksweepError as LinksweepError
+from sweep.errors import LinksweepWarning as LinksweepWarning
+from sweep.errors import StudyError as StudyError
 
 if TYPE_CHECKING:
-    from sweep.dataset.comparison import compare
-    from sweep.dataset.reading import scan
-    from sweep.dataset.store import is_complete, load
-    from sweep.dataset.verification import verify
-    from sweep.engine.run import run
-    from sweep.evaluation import thread
-    from sweep.evaluation.cyclogram import cyclogram
-    from sweep.evaluation.joints import joints
-    from sweep.evaluation.loads import rod
-    from sweep.evaluation.mechanism import mechanism
-    from sweep.evaluation.poses import evaluate
-    from sweep.evaluation.summaries import summarise
-    from sweep.exchange.export import export
-    from sweep.exchange.points import from_points
-    from sweep.families import machine
-    from sweep.synthesis.mechanisms import synthesise
-
-__all__ = [
-    "IncompleteWarning",
-    "InputError",
-    "LinksweepError",
-    "LinksweepWarning",
-    "StudyError",
-    "compare",
-    "cyclogram",
-    "evaluate",
-    "export",
-    "from_points",
-    "is_complete",
-    "joints",
-    "load",
-    "machine",
-    "mechanism",
-    "plot",
-    "rod",
-    "run",
-    "scan",
-    "summarise",
-    "synthesise",
-    "thread",
-    "verify",
-]
+    from sweep.dataset.comparison import compare as compare
+    from sweep.dataset.reading import scan as scan
+    from sweep.dataset.store import is_complete as is_complete
+    from sweep.dataset.store import load as load
+    from sweep.dataset.verification import verify as verify
+    from sweep.engine.run import run as run
+    from sweep.evaluation import thread as thread
+    from sweep.evaluation.cyclogram import cyclogram as cyclogram
+    from sweep.evaluation.joints import joints as joints
+    from sweep.evaluation.loads import rod as rod
+    from sweep.evaluation.mechanism import mechanism as mechanism
+    from sweep.evaluation.poses import evaluate as evaluate
+    from sweep.evaluation.summaries import summarise as summarise
+    from sweep.exchange.export import export as export
+    from sweep.exchange.points import from_points as from_points
+    from sweep.families import machine as machine
+    from sweep.synthesis.mechanisms import synthesise as synthesise
 
 check_kernels()
 
@@ -74,6 +53,10 @@ _HOMES = {
     "verify": "sweep.dataset.verification",
 }
 _MODULES = {"plot": "sweep.plot", "thread": "sweep.evaluation.thread"}
+
+__all__ = sorted(
+    ["IncompleteWarning", "InputError", "LinksweepError", "LinksweepWarning", "StudyError", *_HOMES, *_MODULES]
+)
 
 
 def __getattr__(name: str) -> Any:
