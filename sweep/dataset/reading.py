@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sweep.dataset import chunk_files
-from sweep.errors import InputError, StoreError, nearest, whole
+from sweep.dataset import chunk_files, store
+from sweep.errors import InputError, nearest, whole
 from sweep.quantities.limits import compared
 
 if TYPE_CHECKING:
@@ -57,10 +56,7 @@ def scan(folder: str | Path) -> ds.Dataset:
     """
     import pyarrow.dataset as ds
 
-    place, chunks = chunk_files.required_parts(folder, "scan")
-    for one, other in pairwise(chunks):
-        if one.identity != other.identity or one.index == other.index:
-            raise StoreError(f"{place}: {one.path.name} and {other.path.name} are not chunks of one table")
+    _, chunks = store.parts_of_one_table(folder, "scan")
     for part in chunks:
         chunk_files.about(part)
     chunk_files.check_columns(chunks)

@@ -51,6 +51,26 @@ def _twice(folder: Path, one: chunk_files.ChunkFile, other: chunk_files.ChunkFil
     return StoreError(f"{folder}: two different chunks {one.index}, {names}; remove the one you do not trust")
 
 
+def parts_of_one_table(folder: str | Path, verb: str) -> tuple[Path, list[chunk_files.ChunkFile]]:
+    """Return the folder of designs of a dataset, and its chunks, of one study and each once.
+
+    Raises
+    ------
+    InputError
+        if the folder holds no chunks
+    StoreError
+        for chunks of different data, or two of one number.
+    """
+    place, chunks = chunk_files.required_parts(folder, verb)
+    for one, other in pairwise(chunks):
+        if one.identity != other.identity:
+            names = f"{one.path.name} and {other.path.name}"
+            raise StoreError(f"{place}: chunks of different studies or sources, {names}; they are not one table")
+        if one.index == other.index:
+            raise _twice(place, one, other)
+    return place, chunks
+
+
 def foreign(folder: Path, what: str, plan: Plan) -> InputError:
     """Make the error for data of another study or code, which are never mixed."""
     allowed = (
@@ -151,13 +171,7 @@ def load(folder: str | Path, units: bool = False) -> pd.DataFrame:
     """
     import pyarrow as pa
 
-    place, chunks = chunk_files.required_parts(folder, "load")
-    for one, other in pairwise(chunks):
-        if one.identity != other.identity:
-            names = f"{one.path.name} and {other.path.name}"
-            raise StoreError(f"{place}: chunks of different studies or sources, {names}; they are not one table")
-        if one.index == other.index:
-            raise _twice(place, one, other)
+    place, chunks = parts_of_one_table(folder, "load")
     tables = [part.read()[0].read() for part in chunks]
     chunk_files.check_columns(chunks, [table.schema for table in tables])
     missing = chunk_files.missing_chunks(place, chunks)

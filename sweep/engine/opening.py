@@ -89,17 +89,12 @@ def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
 
 def _set_foreign_aside(folder: Path, plan: Plan, others: tuple[str, ...]) -> str:
     """Move chunks of other plans and some side files into a folder of old data; return its name."""
-    place, old_folder = files.beside(folder), old_name()
+    place, old_folder = files.beside(folder), f"{files.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
     old = [part.path for part in chunk_files.parts(folder) if part.identity != plan.identity]
     old += [place / name for name in others if (place / name).is_file()]
     if old:
         files.set_aside(folder, old, old_folder)
     return old_folder
-
-
-def old_name() -> str:
-    """Name of the folder for data that are set aside now."""
-    return f"{files.OLD}/{time.strftime('%Y%m%d-%H%M%S')}"
 
 
 def words_of(study: Study) -> dict[str, Any]:

@@ -278,13 +278,14 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     first = designs[0].design
     rows = [row_of(data.study, first | {name: entry.design[name] for name in parameters}) for entry in designs]
     compared = judged(data, rows, names)
-    lines = [tables.parameter_rows(as_result(data, row)) for row in rows]
+    lines = zip(*(tables.parameter_rows(as_result(data, row)) for row in rows), strict=True)
+    dimensions = [(same[0].name, same[0].text, [row.value for row in same]) for same in lines]
     text = rendered(
         COMPARISON,
         names=names,
         folders=[str(folder) for folder in folders],
         study=data.study,
-        dimensions=sorted(map(_values, zip(*lines, strict=True)), key=lambda line: len(set(line[2])) == 1),
+        dimensions=sorted(dimensions, key=lambda line: len(set(line[2])) == 1),
         motion_data=embedded(compared["motion"]) if compared["motion"] else "",
         axis=compared["motion"]["axis"] if compared["motion"] else "",
         scripts=scripts_of(compared["motion"]),
@@ -302,7 +303,3 @@ def _names(studies: Sequence[str], folders: Sequence[Path]) -> list[str]:
     if len({*studies}) == len(studies):
         return list(studies)
     return [str(folder.parent.name if folder.name == "designs" else folder.name) for folder in folders]
-
-
-def _values(same: Sequence[tables.ParameterRow]) -> tuple[str, str, list[str]]:
-    return same[0].name, same[0].text, [row.value for row in same]

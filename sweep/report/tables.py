@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -122,20 +123,6 @@ NOTHING = 1e-9  # share of the longest length below which a length is zero
 
 
 @dataclass(frozen=True)
-class OutputRow:
-    """One output of the result, compared with the reference."""
-
-    name: str
-    symbol: str
-    text: str
-    value: str
-    fast: str
-    reference: str
-    reference_fast: str
-    change: str
-
-
-@dataclass(frozen=True)
 class ParameterRow:
     """One parameter; ``space`` is its searched range, ``edge`` the end of it at which the result lies, if any."""
 
@@ -157,8 +144,8 @@ class Fate:
     percent: float
 
 
-def output_rows(data: Dataset) -> list[OutputRow]:
-    """Return the wanted outputs in designers' units, the objective first."""
+def output_rows(data: Dataset) -> list[SimpleNamespace]:
+    """Return the wanted outputs in designers' units, compared with the reference, the objective first."""
     study = data.study
     objective = [data.objective.name] if data.objective is not None else []
     rows = []
@@ -167,15 +154,15 @@ def output_rows(data: Dataset) -> list[OutputRow]:
         value, other = value_of(data.result, name), value_of(data.reference, name)
         flag = is_flag(name)
         rows.append(
-            OutputRow(
-                name,
-                shown.symbol,
-                data.definitions.get(name, shown.words).removeprefix(f"negative of {without_minus(name)}: "),
-                _yes(value) if flag else shown.show(value),
-                shown.at_speed(value, study.speed),
-                _yes(other) if flag else shown.show(other),
-                shown.at_speed(other, study.speed),
-                "" if flag or is_place(name) else change(shown, value, other),
+            SimpleNamespace(
+                name=name,
+                symbol=shown.symbol,
+                text=data.definitions.get(name, shown.words).removeprefix(f"negative of {without_minus(name)}: "),
+                value=_yes(value) if flag else shown.show(value),
+                fast=shown.at_speed(value, study.speed),
+                reference=_yes(other) if flag else shown.show(other),
+                reference_fast=shown.at_speed(other, study.speed),
+                change="" if flag or is_place(name) else change(shown, value, other),
             )
         )
     return rows

@@ -28,7 +28,6 @@ from sweep.study.objective import (
     read_optimise,
     read_pareto,
 )
-from sweep.study.parameter import Entry
 from sweep.study.report import check_report
 from sweep.study.study import (
     Budget,
@@ -41,7 +40,6 @@ from sweep.study.tables import Sections, read_sections
 from sweep.study.thread import read_threads
 from sweep.study.tolerance import check_tolerance, read_tolerance
 from sweep.study.toml import key_lines, read_toml, toml_text
-from sweep.synthesis.locus import OnLocus
 
 if TYPE_CHECKING:
     from sweep.synthesis.tasks.problem import SynthesisTask
@@ -178,7 +176,8 @@ def _study(
     check_objective(objective, family, faults)
     check_steady(file, family, objective, limits)
     front = read_pareto(sections.pareto, file, family, objective, sections.optimise, limits)
-    other = _other_tables(file, bare, family, fitted, sections.scene.speed, locus, prescribed, inputs)
+    made, given = (() if locus is None else locus.made), speeds(family, sections.scene.speed)
+    other = OtherTables(fitted, given, made, prescribed, inputs.raw, tables_of_inputs(file, bare, family, inputs))
     space = read_space(file, family, other)
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
         check_varied(file, family, space, inputs.raw)
@@ -216,16 +215,6 @@ def _study(
         budget=Budget(sections.budget.disk, sections.budget.time),
         data=_completed(file, sections, accuracy, inputs),
     )
-
-
-def _other_tables(
-    file: StudyFile, bare: Family, family: Family, fitted: tuple[str, ...], speed: float | None, locus: OnLocus | None,
-    prescribed: dict[str, Entry], inputs: Inputs,
-) -> OtherTables:  # fmt: skip
-    """Collect the parameters that other tables than [design] give."""
-    tables = tables_of_inputs(file, bare, family, inputs)
-    made = () if locus is None else locus.made
-    return OtherTables(fitted, speeds(family, speed), made, prescribed, inputs.raw, tables)
 
 
 def _computed(
