@@ -333,9 +333,9 @@ def test_bad_requests_are_refused(tmp_path):
         ({"path": tmp_path / "a.glb", "format": "stl"}, "csv, glb"),
         ({"path": tmp_path / "a.txt", "format": "dxf"}, "ending in .dxf"),
         ({"path": tmp_path / "a.glb", "unit": "inch"}, "mm or m"),
-        ({"path": tmp_path / "a.glb", "poses": 2}, "at least 3"),
+        ({"path": tmp_path / "a.glb", "poses": 2}, "a whole number from 3"),
         ({"path": tmp_path / "a.glb", "poses": 12.5}, "a whole number"),
-        ({"path": tmp_path / "a.glb", "poses": 100_001}, "at most 100000"),
+        ({"path": tmp_path / "a.glb", "poses": 100_001}, "to 100000"),
         ({"path": tmp_path / "a.glb", "phi": math.inf}, "phi = inf; allowed: a finite angle"),
         ({"path": tmp_path / "a.glb", "speed": -1.0}, "positive"),
     ):
