@@ -120,9 +120,7 @@ def write_atomically(path: Path, data: bytes, where: Path | None = None) -> None
         if the disk is full or not writable; no partial file is left.
     """
     # Containers of a cluster that share a folder may have equal process ids.
-    temporary = (
-        path.parent if where is None else where
-    ) / f"{TEMPORARY}{os.getpid()}-{os.urandom(4).hex()}-{path.name}"
+    temporary = (where or path.parent) / f"{TEMPORARY}{os.getpid()}-{os.urandom(4).hex()}-{path.name}"
     with store_errors(path):
         temporary.parent.mkdir(parents=True, exist_ok=True)
         try:

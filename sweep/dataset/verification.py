@@ -279,10 +279,9 @@ def row_faults(
     if np.any(np.diff(designs) <= 0) or np.any((designs < chunk["start"]) | (designs >= chunk["stop"])):
         return [*faults, f"design numbers not growing inside {chunk['start']}:{chunk['stop']}"]
     faults += _count_faults(status, chunk)
-    if study is not None and study.output.keep == "all" and len(rows) != chunk["stop"] - chunk["start"]:
-        faults.append(
-            f"{how_many(len(rows), 'row')}, although every one of {chunk['stop'] - chunk['start']} designs is kept"
-        )
+    total = chunk["stop"] - chunk["start"]
+    if study is not None and study.output.keep == "all" and len(rows) != total:
+        faults.append(f"{how_many(len(rows), 'row')}, although every one of {total} designs is kept")
     outputs = [column["name"] for column in about.get("columns", []) if column["role"] == "output"]
     missing = rows.loc[status == 0, [name for name in outputs if not is_error(name)]].isna().any()
     faults += [f"{name}: missing values in rows whose status is ok" for name in missing.index[missing]]

@@ -159,9 +159,8 @@ def searches(study: Study, jobs: int, known: Pilot) -> tuple[tuple[str, float, f
     whole, sample = _made_seconds(study, problem, designs[0])
     if study.wanted_yield is not None:
         expected, longest = (n * seconds + POPULATIONS * population for n in _robust_looks(settings, settled))
-        few, many = (
-            n * min(robust.CONTINUED, settings.starts) * sample / jobs for n in (MADE_SAMPLES, robust.CORRECTIONS + 1)
-        )
+        ends = min(robust.CONTINUED, settings.starts)
+        few, many = (n * ends * sample / jobs for n in (MADE_SAMPLES, robust.CORRECTIONS + 1))
         rows.append(("tolerances", expected + few, 2.0 * longest + many))
     if study.pareto is not None:
         count = pareto.searches(study.pareto)
@@ -233,11 +232,8 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
     if target is not None:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
         variants = [(words, with_accuracy(study, t)) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
-        provable = [
-            name
-            for name in certified_names(study.family)
-            if name in study.want and not (study.window and is_windowed(study.family, name))
-        ]
+        wanted = [name for name in certified_names(study.family) if name in study.want]
+        provable = [name for name in wanted if not (study.window and is_windowed(study.family, name))]
         if study.accuracy.certify:
             variants.append(("without the proof", with_accuracy(study, certify=False)))
         elif provable:

@@ -49,12 +49,16 @@ def open_plan(study: Study, folder: Path, force: bool, chunk_size: int | None = 
 
 def _differs_in_limits_only(study: Study, noted: dict[str, Any], plan: Plan) -> bool:
     """Whether stored designs can be sorted by new limits: all rows were kept in float64, only limits changed."""
-    other = ("limits", *NOT_IN_CHUNKS)
-    before, now = ({k: v for k, v in data.items() if k not in other} for data in (noted.get("data") or {}, study.data))
+    before, now = (_in_chunks(data, "limits") for data in (noted.get("data") or {}, study.data))
     complete = study.output.keep == "all" and study.output.dtype == "float64"
     columns = [column.name for column in plan.columns]
     same = before == now and [column["name"] for column in noted.get("columns", [])] == columns
     return complete and same and noted.get("code") == plan.code
+
+
+def _in_chunks(data: Mapping[str, Any], *others: str) -> dict[str, Any]:
+    """Return the tables of a study that determine values in a chunk, without some others."""
+    return {key: value for key, value in data.items() if key not in (*NOT_IN_CHUNKS, *others)}
 
 
 def known_folder(folder: Path) -> Path | None:
@@ -76,10 +80,7 @@ def part_range(folder: Path, chunks: int) -> range:
 
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
     """Describe how the data in the folder differ from those that this run would compute."""
-    before, now = (
-        {key: value for key, value in data.items() if key not in NOT_IN_CHUNKS}
-        for data in (noted.get("data") or noted["chunk_data"], study.data)
-    )
+    before, now = (_in_chunks(data) for data in (noted.get("data") or noted["chunk_data"], study.data))
     reasons = [] if noted.get("study") == plan.study else differences(before, now)
     if noted.get("code") != plan.code:
         reasons.append("other sources or libraries")

@@ -200,9 +200,8 @@ class KernelStep:
         """Describe a step for progress: the functions compiled for it so far, and its outputs."""
         steps = asked_outputs(self.study)
         names = steps[number] if number < len(steps) else ["the search over proportions"]
-        return (
-            f"steps, {how_many(functions, 'function')} compiled for {', '.join(names[:3])}{' ...' * (len(names) > 3)}"
-        )
+        named = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
+        return f"steps, {how_many(functions, 'function')} compiled for {named}"
 
 
 def _compile(study: Study, jobs: int, phases: Phases) -> None:

@@ -251,14 +251,8 @@ def error_rows(data: Dataset, scanned: Scan) -> list[tuple[str, str, str, str]]:
             continue
         shown = quantity(error, data.units.get(error, data.units.get(name, "")))
         largest, relative = scanned.errors.get(error, (math.nan, math.nan))
-        rows.append(
-            (
-                quantity(name, "").symbol,
-                shown.show(value_of(data.result, error), 2),
-                shown.show(largest, 2),
-                number(relative, 2),
-            )
-        )
+        here, most = (shown.show(size, 2) for size in (value_of(data.result, error), largest))
+        rows.append((quantity(name, "").symbol, here, most, number(relative, 2)))
     return rows
 
 
@@ -285,11 +279,8 @@ def run_rows(runs: tuple[dict[str, Any], ...]) -> list[tuple[str, str]]:
     if not starts:
         return []
     last = starts[-1]
-    rows = [
-        (key, str(last[key]))
-        for key in ("command", "time", "commit", "machine", "python", "jobs", "backend")
-        if last.get(key)
-    ]
+    keys = ("command", "time", "commit", "machine", "python", "jobs", "backend")
+    rows = [(key, str(last[key])) for key in keys if last.get(key)]
     rows.append(("versions", ", ".join(f"{name} {release}" for name, release in last.get("versions", {}).items())))
     seconds = sum(run.get("seconds", 0.0) for run in runs)
     rows.append(("time taken", f"{number(seconds, 3)} s in {how_many(len(starts), 'run')} into this folder"))

@@ -68,11 +68,8 @@ def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[L
         return
     for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):
         if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
-            faults.value(
-                ("tolerance", key),
-                f"{size:.6g} {UNITS[unit]}",
-                f"nothing: {family.name} has no {key} that could deviate",
-            )
+            allowed = f"nothing: {family.name} has no {key} that could deviate"
+            faults.value(("tolerance", key), f"{size:.6g} {UNITS[unit]}", allowed)
     with_room = [x.output for x in limits if x.minimum != x.maximum]
     equations = [x.output for x in limits if x.is_equation and x.output not in with_room]
     if tolerance.robust is not None and equations:
