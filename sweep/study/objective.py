@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Literal, cast
 
 from sweep.errors import InputError
@@ -68,32 +69,18 @@ def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, l
     checked = [(("objective", key), name, name) for key, name in objective.named]
     checked += [(("limits", limit.output), limit.output, written.get(limit.output, limit.output)) for limit in limits]
     for key, name, given in checked:
-        if name not in family.parameter_names and _jumps(family, name):
-            allowed = (
-                f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for it "
-                "in scene.want, or leave out [optimise] and let the sweep alone decide"
-            )
-            file.faults.value(key, given, allowed)
+        with suppress(InputError):  # an unknown name is reported where it stands
+            if name not in family.parameter_names and output(family, name).jumps:
+                allowed = (
+                    f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for "
+                    "it in scene.want, or leave out [optimise] and let the sweep alone decide"
+                )
+                file.faults.value(key, given, allowed)
     for limit in limits:
-        allowed = _followed(family, limit)
-        if allowed:
-            given = written.get(limit.output, limit.output)
-            file.faults.value(("limits", limit.output), given, f"{allowed}, as [optimise] is given")
-
-
-def _followed(family: Family, limit: Limit) -> str:
-    """Describe the bounds that the optimiser can follow, if it cannot follow those of a limit."""
-    try:
-        return measure(family, limit.output).refused(limit.minimum, limit.maximum)
-    except InputError:  # reported where the name stands
-        return ""
-
-
-def _jumps(family: Family, name: str) -> bool:
-    try:
-        return output(family, name).jumps
-    except InputError:  # an unknown name is reported where it stands
-        return False
+        with suppress(InputError):
+            if allowed := measure(family, limit.output).refused(limit.minimum, limit.maximum):
+                given = written.get(limit.output, limit.output)
+                file.faults.value(("limits", limit.output), given, f"{allowed}, as [optimise] is given")
 
 
 class ProveTable(Section):
