@@ -173,13 +173,21 @@ def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> A
 
 
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:
-    """List functions of designs (n, P) and angles whose complex zeros are the singularities of the pose outputs."""
-    found = [partial(_measured, family, known) for known in about(family, Singular, outputs)]
+    """List functions of designs (n, P) and angles whose complex zeros are the singularities of the pose outputs.
+
+    A function that concerns several outputs is the same object for each of them.
+    """
+    every: dict[Singular, SingularCurve] = family.derived.setdefault(singular_curves, {})
+
+    def curve_of(known: Singular) -> SingularCurve:
+        return every.setdefault(known, partial(_measured, family, known))
+
+    found = [curve_of(known) for known in about(family, Singular, outputs)]
     discriminants = [loop.discriminant for loop in family.every(Assembly)]
     if set(outputs) <= set(discriminants):
         # Discriminants are smooth where they vanish, and defined where the links do not reach.
         return [partial(_where_reached, curve) for curve in found]
-    return [*(partial(_measured, family, Singular(_only, (name,))) for name in discriminants), *found]
+    return [*(curve_of(Singular(_only, (name,))) for name in discriminants), *found]
 
 
 def _where_reached(curve: SingularCurve, designs: Array, angles: Angles) -> Array:

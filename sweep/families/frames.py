@@ -28,7 +28,7 @@ class Frame(NamedTuple):
     def turned(self, vector: list[Any]) -> list[Any]:
         """Transform a vector to the outer frame; components (n, m) each."""
         x, y, z = vector
-        return [r[:, 0, None] * x + r[:, 1, None] * y + r[:, 2, None] * z for r in np.moveaxis(self.rotation, 1, 0)]
+        return [r[:, 0, None] * x + r[:, 1, None] * y + r[:, 2, None] * z for r in self.rotation.swapaxes(0, 1)]
 
     def placed(self, point: list[Any]) -> list[Any]:
         """Transform a point to the outer frame; coordinates (n, m) each."""

@@ -15,23 +15,26 @@ SHORTEST = 1e-11  # distance of a zero [rad] below which its effect falls betwee
 BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump one for each bit of the angle
 GRID, GRIDS = 9, 26  # points of each grid about a minimum; grids that narrow a whole turn down to rounding
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
+SAME = 1e-9  # distance [rad] of a root from a jump below which it counts as the jump
 FLAT = 1e-9  # width of brackets [rad] in which a smooth function is at its minimum to rounding
 
 Functions: TypeAlias = Callable[[Indices, Array], Array]
 """``f(rows, phi)``: values (k, m, q) of q functions of the designs ``rows`` (k,) at crank angles (k, m)."""
 
 
-def sign_changes(functions: Functions, angles: Array) -> tuple[Indices, Array]:
+def sign_changes(functions: Functions, angles: Array, jumps: Array | None = None) -> tuple[Indices, Array]:
     """Find designs (k,) and crank angles (k,) in [0, 2 pi) at which one of the functions changes its sign.
 
     Parameters
     ----------
     functions : continuous, periodic in 2 pi
     angles : (n, m) rising samples of one turn that resolve them: between neighbours at most one extremum
+    jumps : (n, k) known angles at which the functions may jump through zero; these roots are left out
 
     Notes
     -----
-    Roots are found by bracketing.  Two roots between samples appear as a dip, whose bottom is found first.
+    Roots are found by bracketing.  A jump takes a step for each bit of its angle.  Two roots between samples appear as
+    a dip, whose bottom is found first.
     """
     before, after, values, left, right = _with_neighbours(functions, angles)
     row, column, which = np.nonzero((values < 0.0) != (right < 0.0))
@@ -53,8 +56,24 @@ def sign_changes(functions: Functions, angles: Array) -> tuple[Indices, Array]:
     brackets += [(row, which, low, bottom), (row, which, bottom, high)]
 
     rows, numbers, lows, highs = (np.concatenate(parts) for parts in zip(*brackets, strict=True))
+    if jumps is not None and jumps.size:
+        k, lows, highs = _beside(jumps[rows], lows, highs)
+        rows, numbers = rows[k], numbers[k]
+        at = _one(functions, rows, numbers, np.stack([lows, highs], axis=1)) < 0.0
+        rows, numbers, lows, highs = (y[at[:, 0] != at[:, 1]] for y in (rows, numbers, lows, highs))
     found = zeros(lambda k, phi: _one(functions, rows[k], numbers[k], phi[:, None])[:, 0], lows, highs)
     return rows, np.mod(found, TWO_PI)
+
+
+def _beside(jumps: Array, lows: Array, highs: Array) -> tuple[Indices, Array, Array]:
+    """Cut brackets (k,) at jumps (k, c): number of the bracket, and both ends, of each piece."""
+    width = (highs - lows)[:, None]
+    place = np.mod(jumps - lows[:, None], TWO_PI)
+    place = np.sort(np.where(place <= width, place, np.inf), axis=1)
+    starts = np.append(np.zeros_like(width), place + SAME, axis=1)
+    ends = np.minimum(np.append(place - SAME, width, axis=1), width)
+    k, piece = np.nonzero(starts < ends)
+    return k, lows[k] + starts[k, piece], lows[k] + ends[k, piece]
 
 
 def zeros(function: Callable[[Indices, Array], Array], low: Array, high: Array) -> Array:

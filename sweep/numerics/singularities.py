@@ -49,11 +49,16 @@ def singularities(discriminants: Sequence[Discriminant], n: int, within: float =
     """
     if not discriminants:
         return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
-    found = [_dips(curve, n, number, within) for number, curve in enumerate(discriminants)]
+    return side_by_side([dips(curve, n, number, within) for number, curve in enumerate(discriminants)])
+
+
+def side_by_side(found: Sequence[Singularities]) -> Singularities:
+    """Join the zeros of several discriminants of the same designs."""
     return Singularities(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
 
 
-def _dips(curve: Discriminant, n: int, number: int, within: float) -> Singularities:
+def dips(curve: Discriminant, n: int, number: int, within: float) -> Singularities:
+    """Find the nearest zeros of one discriminant, the ``number``-th of its kind, as `singularities` does."""
     spacing = TWO_PI / SAMPLES
     turn = np.arange(SAMPLES, dtype=np.float64) * spacing
     # One row of angles for all designs: their cosines and sines are computed once.

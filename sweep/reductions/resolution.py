@@ -21,7 +21,16 @@ from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import Bends, SingularCurve
 from sweep.numerics.events import near_zeros, sign_changes, with_events
 from sweep.numerics.records import Indices, Mask, only, put
-from sweep.numerics.singularities import FAR, SAMPLES, SHORTEST, Discriminant, Singularities, crowded, singularities
+from sweep.numerics.singularities import (
+    FAR,
+    SAMPLES,
+    SHORTEST,
+    Singularities,
+    crowded,
+    dips,
+    side_by_side,
+    singularities,
+)
 from sweep.quantities.kinds import Request
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, blocks, pose_columns, sample_turn
 
@@ -59,19 +68,25 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
 def nearest(family: Family, designs: Array, outputs: Collection[str], within: float = FAR) -> Singularities:
     """Find the nearest singularities of pose outputs of a family's designs, from its most accurate poses.
 
-    Singularities farther away than ``within`` [rad] are not refined beyond even samples.
+    Singularities farther away than ``within`` [rad] are not refined beyond even samples.  Those of the last designs
+    are kept: outputs of one mechanism have most of their curves in common.
     """
     curves = features.singular_curves(family.precise(), outputs)
+    if not curves or not len(designs):
+        return singularities([lambda rows, phi: np.empty(phi.shape)] * len(curves), len(designs))
+    known: dict[object, tuple[Array, Singularities]] = family.derived.setdefault(nearest, {})
 
-    def of_rows(some: Indices, curve: SingularCurve) -> Discriminant:
-        return lambda rows, phi: curve(designs[some[rows]], Angles.of(phi))
+    def of_curve(curve: SingularCurve, number: int, some: Array) -> Singularities:
+        kept = known.get((curve, number, within))
+        if kept is None or not np.array_equal(kept[0], some):
+            found = dips(lambda rows, phi: curve(some[rows], Angles.of(phi)), len(some), number, within)
+            kept = known[curve, number, within] = some, found
+        return kept[1]
 
     parts = [
-        singularities([of_rows(some, curve) for curve in curves], some.size, within)
+        side_by_side([of_curve(curve, number, designs[some]) for number, curve in enumerate(curves)])
         for some in blocks(np.arange(len(designs)), SAMPLES, len(curves))
     ]
-    if not parts:
-        return singularities([of_rows(np.arange(0), curve) for curve in curves], 0)
     return Singularities(*(np.concatenate(found) for found in zip(*parts, strict=True)))
 
 
@@ -116,7 +131,7 @@ def ends(family: Family, designs: Array, even: int, looks: int, output: str) -> 
     angles = crowded(only(near, close), LOOK)
     edges = with_events(edges, *_passed(family, designs, (output,), _looked(n, looks, close, angles)))
     for bent in features.about(family, Bends, (output,)):
-        edges = with_events(edges, *_bent(bent, designs, _looked(n, BENDING, close, angles)))
+        edges = with_events(edges, *_bent(bent, designs, _looked(n, BENDING, close, angles), known))
     return edges
 
 
@@ -142,13 +157,16 @@ def zeros(family: Family, designs: Array, output: str) -> tuple[Indices, Array]:
     return found[0] if found else (np.zeros(0, np.intp), np.zeros(0))
 
 
-def _bent(bent: Bends, designs: Array, looked: Array) -> tuple[Indices, Array]:
-    """Find designs and angles where functions pass zero at which curves bend, bracketed by the angles ``looked``."""
+def _bent(bent: Bends, designs: Array, looked: Array, known: Array | None = None) -> tuple[Indices, Array]:
+    """Find designs and angles where functions pass zero at which curves bend, bracketed by the angles ``looked``.
+
+    Jumps through zero at angles ``known``, (n, k), are left out.
+    """
 
     def bending(rows: Indices, phi: Array) -> Array:
         return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))
 
-    return near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked)
+    return near_zeros(bending, looked, CLOSE) if bent.squares else sign_changes(bending, looked, known)
 
 
 def _passed(family: Family, designs: Array, outputs: Collection[str], looked: Array) -> tuple[Indices, Array]:

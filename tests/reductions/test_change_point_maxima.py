@@ -11,7 +11,9 @@ import sweep
 from kernels import status as st
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy
+from sweep.numerics import singularities
 from sweep.numerics.singularities import Singularities, crowded
+from sweep.reductions import resolution
 from sweep.reductions.rounding import nearest
 from tests.support.near_change_points import LONG, RSSR, brute_maxima, brute_range, near_change_points, tiny_cranks
 from tests.support.rssr_designs import margins
@@ -28,6 +30,21 @@ def test_higher_of_two_peaks_beside_a_sharp_zero_is_found_at_any_accuracy(accura
     # The other peak is 0.14 rad away and 4e-5 lower.
     assert abs(found["max_abs_dpsi"] - exact) <= found["err_max_abs_dpsi"] <= 0.1 * max(accuracy, 1e-7)
     assert abs(found["phi_max_abs_dpsi"] - 6.2127) < 1e-4
+
+
+def test_singularities_of_the_last_designs_are_kept_for_all_outputs_and_for_no_other_designs(monkeypatch):
+    family, searched = replace(RSSR), []
+    monkeypatch.setattr(resolution, "dips", lambda *given: searched.append(given) or singularities.dips(*given))
+    designs = near_change_points(60, 5, 1.0)
+    first = nearest(family, designs[:30], ("dpsi",))
+    again = nearest(family, designs[:30].copy(), ("d2psi",))
+    np.testing.assert_array_equal(again, first)
+    assert len(searched) == 1
+    other = nearest(family, designs[30:], ("dpsi",))
+    assert len(searched) == 2
+    for found, rows in ((first, slice(30)), (other, slice(30, 60)), (nearest(family, designs, ("dpsi",)), slice(60))):
+        alone = nearest(replace(RSSR), designs[rows], ("dpsi",))
+        np.testing.assert_array_equal(found, alone)
 
 
 @pytest.mark.parametrize("longest", [1.0, 1e5])

@@ -150,6 +150,23 @@ def test_two_zeros_between_samples_are_found_however_close(depth):
     np.testing.assert_allclose(np.sort(phi), exact, rtol=0.0, atol=4.0 * 2.0**-53 / np.sqrt(depth) + 1e-15 * TURN)
 
 
+def test_jumps_at_known_angles_are_left_out_and_zeros_beside_them_found():
+    turn, calls = np.arange(128)[None] * (TURN / 128), []
+
+    def functions(rows, phi):
+        calls.append(phi.size)
+        x = np.mod(phi, TURN)  # jumps through zero at 1 and 4, and passes it soon after
+        first = np.where(x < 1.0, 1.0, x - 1.003)
+        return np.where(x < 4.0, first, x - 4.01)[:, :, None]
+
+    every = sign_changes(functions, turn)[1]
+    np.testing.assert_allclose(np.sort(every), [1.0, 1.003, 4.0, 4.01], rtol=0.0, atol=1e-15 * TURN)
+    slow = len(calls)
+    row, phi = sign_changes(functions, turn, np.array([[1.0, 4.0]]))
+    assert row.tolist() == [0, 0] and len(calls) - slow < slow / 2  # a jump takes a call for each bit
+    np.testing.assert_allclose(np.sort(phi), [1.003, 4.01], rtol=0.0, atol=1e-15 * TURN)
+
+
 @pytest.mark.parametrize("least", [1e-3, 1e-8, 0.0])
 def test_a_square_that_nearly_vanishes_is_cut_at_its_bottom_and_ever_farther_beside_it(least):
     """No panel beside the bottom is longer than seven times the distance of its end from there."""

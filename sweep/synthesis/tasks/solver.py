@@ -20,6 +20,7 @@ STEP = 3e-6  # step of central differences, in units of the box
 SHARE = 0.8  # share of the largest magnitude below which poses do not bound t
 ROUNDS = 24
 WIDEST = 0.15  # initial radius of a step, in units of the box
+LOOKS = 240  # of least squares: along the kink at which a limit becomes active, steps are short
 MET = 1e-9  # largest residual and violation of a feasible solution
 ENOUGH, ALIKE = 4, 1e-4  # number of samples that have to end at the best objective, to this relative difference
 APART = 1e-2  # share of the box: closer solutions count as the same
@@ -202,7 +203,9 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
     run: Any = least_squares
     if not np.isfinite(scaled.rows(inside).equations).all():
         return z
-    result = run(residuals, inside, jac=jacobian, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+    result = run(
+        residuals, inside, jac=jacobian, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=LOOKS
+    )
     point: Array = result.x
     for _ in range(4):
         step = np.linalg.lstsq(jacobian(point), -residuals(point), rcond=1e-12)[0]
