@@ -121,7 +121,7 @@ def task(file: Path, candidates: int, starts: int, samples: int, seed: int, out:
     for solution in solutions:
         click.echo(str(solution))
     if not solutions:
-        click.echo("no candidate was a mechanism at all")
+        click.echo("no candidate was a mechanism at all: what is given allows none (docs/synthesis.md, section 5)")
     if out is not None:
         rows = [s.mechanism | {"objective": s.objective, "feasible": s.feasible} for s in solutions]
         write_table(pd.DataFrame(rows), out)

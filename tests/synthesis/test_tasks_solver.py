@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+import sweep
 from sweep.errors import InputError
 from sweep.synthesis.tasks import (
     EngineeringMethod,
@@ -27,6 +28,13 @@ from tests.support.task_cases import TASK3
 
 DRIVE = {"a": 0.4, "b": 1.8, "c": 1.2, "e": 1.5, "f": 1.2, "g": 1.0, "alpha": 1.3, "branch": -1.0}
 FRAME = {"phi0": 3.2, "e": 1.0, "g": 1.0, "alpha": 1.3, "f_range": (-3.0, 3.0)}
+
+
+LOOPER = {"e": 35.0,
+          "alpha": 0.5 * np.pi, "swing_range": (np.pi / 6, np.pi / 3), "max_pressure_angle": np.radians(50.0),
+          "positions": (Position(*np.radians([40.0, 5.0])), Position(*np.radians([120.0, 31.0]))),
+          "phi0_range": tuple(np.radians([160.0, 200.0])),
+          "bounds": {"a": (4.0, 20.0), "b": (20.0, 90.0), "c": (10.0, 60.0)}}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -153,3 +161,21 @@ def test_solution_reads_as_text():
 def test_ill_posed_tasks_are_refused(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+def test_equations_are_met_along_a_limit_that_is_only_just_kept():
+    """Least squares take up to 120 steps along the kink at which the pressure angle becomes active."""
+    solutions = solve(Task2(g=6.0, **LOOPER), samples=1)
+    assert solutions and all(one.feasible for one in solutions)
+
+
+def test_right_angled_axes_that_meet_have_no_crank_rocker_but_those_of_half_a_turn():
+    assert solve(Task2(g=0.0, **LOOPER), samples=1) == []
+    random = np.random.default_rng(0).uniform([2.0, 20.0, 10.0, -40.0], [20.0, 90.0, 60.0, 40.0], (2000, 4))
+    table = dict(zip("abcf", random.T, strict=True)) | {
+        name: np.full(2000, LOOPER.get(name, 0.0)) for name in ("e", "g", "alpha")
+    }
+    found = sweep.summarise("rssr", table, ["phi0"], accuracy=1e-8)
+    turns = found["status"] == 0
+    assert turns.sum() > 1000
+    np.testing.assert_allclose(found["phi0"][turns], np.pi, rtol=0.0, atol=1e-12)
