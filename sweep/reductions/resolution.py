@@ -68,25 +68,23 @@ def denser(family: Family, designs: Array, outputs: Collection[str], near: Singu
 def nearest(family: Family, designs: Array, outputs: Collection[str], within: float = FAR) -> Singularities:
     """Find the nearest singularities of pose outputs of a family's designs, from its most accurate poses.
 
-    Singularities farther away than ``within`` [rad] are not refined beyond even samples.  Those of the last designs
-    are kept: outputs of one mechanism have most of their curves in common.
+    Singularities farther away than ``within`` [rad] are not refined beyond even samples.  Those of the last designs are
+    kept: outputs have most of their curves in common.
     """
     curves = features.singular_curves(family.precise(), outputs)
     if not curves or not len(designs):
-        return singularities([lambda rows, phi: np.empty(phi.shape)] * len(curves), len(designs))
+        return singularities((), len(designs))
     known: dict[object, tuple[Array, Singularities]] = family.derived.setdefault(nearest, {})
 
-    def of_curve(curve: SingularCurve, number: int, some: Array) -> Singularities:
+    def of_curve(number: int, curve: SingularCurve, some: Array) -> Singularities:
         kept = known.get((curve, number, within))
         if kept is None or not np.array_equal(kept[0], some):
             found = dips(lambda rows, phi: curve(some[rows], Angles.of(phi)), len(some), number, within)
             kept = known[curve, number, within] = some, found
         return kept[1]
 
-    parts = [
-        side_by_side([of_curve(curve, number, designs[some]) for number, curve in enumerate(curves)])
-        for some in blocks(np.arange(len(designs)), SAMPLES, len(curves))
-    ]
+    every = [designs[some] for some in blocks(np.arange(len(designs)), SAMPLES, len(curves))]
+    parts = [side_by_side([of_curve(*one, some) for one in enumerate(curves)]) for some in every]
     return Singularities(*(np.concatenate(found) for found in zip(*parts, strict=True)))
 
 
@@ -158,10 +156,7 @@ def zeros(family: Family, designs: Array, output: str) -> tuple[Indices, Array]:
 
 
 def _bent(bent: Bends, designs: Array, looked: Array, known: Array | None = None) -> tuple[Indices, Array]:
-    """Find designs and angles where functions pass zero at which curves bend, bracketed by the angles ``looked``.
-
-    Jumps through zero at angles ``known``, (n, k), are left out.
-    """
+    """Find where functions pass zero at which curves bend, between angles ``looked``, without jumps at ``known``."""
 
     def bending(rows: Indices, phi: Array) -> Array:
         return np.nan_to_num(bent.curves(designs[rows], Angles.of(phi)))

@@ -126,7 +126,7 @@ def not_achieved(data: Dataset, scanned: Scan) -> list[str]:
         if wanted_yield is not None and share < wanted_yield:
             faults.append(f"as it is made: {share_words(share, wanted_yield, str(data.optimum.get('ended')))}")
         if objective is not None and scanned.best_row:
-            best, value = scanned.best_row[objective.name], tables.value_of(data.optimum, objective.name)
+            best, value = scanned.best_row[objective.name], tables.value_of(data.drawing or {}, objective.name)
             if not compared(objective.name, value) <= compared(objective.name, best) + BEHIND * abs(best):
                 faults.append(f"the optimiser ended behind the best design of the sweep, {objective.show(best)}")
     return [f"Not achieved: {'; '.join(faults)}."] if faults else []

@@ -99,6 +99,11 @@ class Dataset:
         return self._role("optimum")
 
     @cached_property
+    def drawing(self) -> Row | None:
+        """Row of the best drawing: the optimum, or what it is without the distance that what is made needs."""
+        return self._role("nominal") or self.optimum
+
+    @cached_property
     def reference(self) -> Row | None:
         """Row of the design with which the result is compared."""
         stored = self._role("reference")

@@ -198,8 +198,9 @@ def optima_sentence(data: Dataset, distinct: list[DistinctOptimum]) -> str:
     text = f"The search ended in {len(distinct)} structurally different optima"
     text += f", {same} of them with the best value" if same > 1 else ""
     row = distinct[1].row
-    paper = row.get("role") == "nominal"
-    text += f"; the {'best on paper' if paper else 'next'} has {objective.show(value)}"
+    paper = row.get("role") == "nominal" or data.study.wanted_yield is not None
+    nth = "best on paper" if row.get("role") == "nominal" else "next on paper" if paper else "next"
+    text += f"; the {nth} has {objective.show(value)}"
     text += f" ({difference})" if difference else ""
     share = _made(data, row) if paper else ""
     return f"{text}, but {share}." if share else f"{text}."

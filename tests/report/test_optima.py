@@ -109,6 +109,9 @@ def test_cards_have_picture_sizes_and_yield() -> None:
     assert "the best on paper has 0.5" in sentence and "% less), but" in sentence and "keeps all limits" in sentence
     alike = groups(data_of(row("optimum", 0.7), row(value=0.5, c=18.0), row("nominal", 0.5, c=17.0)))
     assert "the best on paper has 0.5" in optima_sentence(data, alike)
+    robust = replace(data, study=replace(data.study, tolerance=replace(data.study.tolerance, robust=0.95)))
+    sentence = optima_sentence(robust, groups(data_of(row("optimum", 0.7), row(value=0.5, c=17.0))))
+    assert "the next on paper has 0.5" in sentence and "keeps all limits" in sentence
     assert optima(data, found[:1]) == [] and optima_sentence(data, found[:1]) == ""
 
 
