@@ -156,9 +156,8 @@ class Dataset:
         return self.study.pareto.output if self.study.pareto is not None else self.second
 
     def _role(self, role: str) -> Row | None:
-        if self.optima is None:
-            return None
-        return next(iter(records(self.optima[self.optima["role"] == role])), None)
+        rows = [] if self.optima is None else records(self.optima[self.optima["role"] == role])
+        return next(iter(rows), None)
 
 
 def read_dataset(folder: Path) -> Dataset:

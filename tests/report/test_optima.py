@@ -74,6 +74,13 @@ def test_answer_stands_first_even_where_another_is_better_on_paper() -> None:
     assert [group.starts for group in found] == [1, 0, 1]
 
 
+def test_what_is_made_is_not_called_behind_the_best_drawing_of_the_sweep() -> None:
+    scanned = SimpleNamespace(best_row={"max_abs_d2psi": 0.45})
+    behind, drawn = data_of(row("optimum", 0.5)), data_of(row("optimum", 0.5), row("nominal", 0.45))
+    told = [" ".join(not_achieved(data, scanned)) for data in (behind, drawn)]
+    assert ["ended behind" in words for words in told] == [True, False]
+
+
 def test_optima_of_what_is_made_large_come_largest_first() -> None:
     large = DATA | {"objective": {"maximise": "max_abs_d2psi"}}
     found = groups(data_of(row("optimum", 0.9), row(value=0.5, b=60.0), row(value=0.7, c=25.0), **large))
