@@ -31,6 +31,7 @@ PARAMETERS = (
     Parameter("branch", "sign", "assembly mode: +1 or -1, the source's sign s", default=1.0, choices=(-1.0, 1.0)),
 )
 
+_ANGLE = 0.5 * np.pi  # between the axes
 # The crank-rocker's x runs from axis to axis, its z along the rocker's axis, its origin is b above this one.
 _FROM_CRANK_ROCKER = np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
@@ -74,7 +75,7 @@ def as_crank_rocker(designs: Array) -> Array:
     matrix[:, :5] = designs[:, :5]
     with np.errstate(invalid="ignore"):
         matrix[:, 0] += 0.0 * designs[:, 5] + 0.0 * designs[:, 6]
-    matrix[:, 6] = 0.5 * np.pi
+    matrix[:, 6] = _ANGLE
     matrix[:, 7] = -designs[:, 7]
     return matrix
 
@@ -89,7 +90,8 @@ _MADE: Made = {
     "omega3": (("dpsi",), lambda designs, rate: rate * designs[:, [5]]),
     "epsilon3": (("dpsi", "d2psi"), lambda designs, rate, bend: bend * designs[:, [5]] ** 2 + rate * designs[:, [6]]),
     "sin_transmission": (("discriminant", "status"), _sine),
-    "x_b": (("z_b",), lambda designs, z: -z),
+    # without b cos(alpha), which the crank-rocker's rounded right angle leaves
+    "x_b": (("z_b",), lambda designs, z: designs[:, [4]] * np.cos(_ANGLE) - z),
     "y_b": (("x_b",), lambda designs, x: x),
     "z_b": (("y_b",), lambda designs, y: y - y),  # the pin stays in the crank plane; a difference to b leaves rounding
     "x_c": (("z_c",), lambda designs, z: -z),

@@ -125,6 +125,15 @@ def test_kim_dison_equals_its_points(linkage, branch):
     assert np.linalg.norm(apart) == pytest.approx(length, rel=1e-12)
 
 
+def test_kim_dison_crank_pin_far_from_the_rocker_axis_keeps_its_digits():
+    # x_b = r sin(phi), a product of two numbers that are rounded once each: 4 roundings.  b cos(pi/2 rounded) was 1e3.
+    phi = np.array([-8.0, -2.0, 0.3, 1.0, 9.5])
+    given = {"r": 0.01, "l": 130.0, "h": 30.0, "a": 40.0, "b": 120.0, "branch": 1.0}
+    found = sweep.evaluate("kim_dison", given, ["x_b"], phi=phi)
+    assert (found.status == st.OK).all()
+    np.testing.assert_allclose(found.x_b, 0.01 * np.sin(phi), rtol=4.0 * 2.0**-53)
+
+
 def test_kim_dison_maxima_are_those_of_the_crank_rocker():
     rows = [row for row in ROWS if row["kind"] == "swing"]
     designs = np.array([[row["in"][name] for name in LINKS] + [1.0, 0.0, row["in"]["branch"]] for row in rows])
