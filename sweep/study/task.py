@@ -41,8 +41,8 @@ WORDS = ("objective", "adjusted", "limit", "kappa", "branch", "second")
 BEARINGS = ("min_theta1_reserve", "min_theta1_reserve_rolling")
 
 
-def _range(internal: str) -> BeforeValidator:
-    """Return a validator that converts a range with its unit to its ends in the internal unit."""
+def _range(internal: str, of: str = "") -> BeforeValidator:
+    """Return a validator that converts a range with its unit to its ends; ``of`` says in a message what is a range."""
 
     def read(value: object) -> tuple[float, float]:
         table = value if isinstance(value, dict) else {}
@@ -52,7 +52,7 @@ def _range(internal: str) -> BeforeValidator:
         try:
             factor = units.factor(str(table.get("unit", "1")), internal)
         except units.UnitFault as fault:
-            raise PydanticCustomError(QUANTITY, "{words}", {"words": str(fault)}) from None
+            raise PydanticCustomError(QUANTITY, "{words}", {"words": f"{of}{fault}"}) from None
         return float(low) * factor, float(high) * factor
 
     return BeforeValidator(read)
@@ -63,7 +63,7 @@ def _is_number(raw: object) -> TypeGuard[float]:
     return isinstance(raw, int | float) and not isinstance(raw, bool) and -1e100 <= raw <= 1e100
 
 
-LengthBounds = dict[str, Annotated[tuple[float, float], _range("mm")]]
+LengthBounds = dict[str, Annotated[tuple[float, float], _range("mm", "bounds are those of lengths of the result: ")]]
 
 
 def load_task(path: str | Path) -> SynthesisTask:

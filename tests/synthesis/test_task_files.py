@@ -106,6 +106,9 @@ def test_verb_gives_what_python_gives_for_the_example_of_the_page(tmp_path: Path
          ["positions[0].dpsi is missing"]),
         ('[task]\nkind = "task5"\n' + GIVEN + AXES + F + 'rho0 = "1 mm"\nratio_range = { from = nan, to = 4 }',
          ["task.ratio_range"]),
+        ('[task]\nkind = "engineering"\n' + GIVEN + AXES + F
+         + 'bounds = { swing = { from = 1, to = 2, unit = "rad" } }',
+         ["task.bounds.swing", "lengths of the result"]),
         ('[tusk]\nkind = "task1"', ["tusk", "did you mean 'task'"]),
     ],
 )  # fmt: skip
