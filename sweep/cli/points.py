@@ -117,6 +117,7 @@ def _place(folder: Path, name: str) -> Path:
 @click.option("--out", type=click.Path(path_type=Path), help="The mechanisms as a table: .csv or .parquet.")
 def task(file: Path, candidates: int, starts: int, samples: int, seed: int, out: Path | None) -> None:
     """Answer the [task] table of FILE (docs/tasks.md): mechanisms, the best first, lengths in mm, angles in rad."""
+    out = checked_format(out)
     solutions = solve(load_task(file), candidates=candidates, starts=starts, samples=samples, seed=seed)
     for solution in solutions:
         click.echo(str(solution))

@@ -79,6 +79,9 @@ def test_verb_gives_what_python_gives_for_the_example_of_the_page(tmp_path: Path
         main, ["task", str(written(tmp_path, text)), "--candidates", "256", "--starts", "2", "--out", str(out)]
     )
     assert shown.exit_code == 0, shown.output
+    for place, words in (("found.txt", "ending in .parquet or .csv"), ("none/found.csv", "a folder that exists")):
+        refused = CliRunner().invoke(main, ["task", str(tmp_path / "question.toml"), "--out", str(tmp_path / place)])
+        assert refused.exit_code == 2 and words in refused.output  # before the search
     deg = math.pi / 180.0
     same = Task1(
         swing=51 * deg, phi0=189 * deg, e=10.0, g=10.0, alpha=75 * deg, positions=(Position(57 * deg, 14 * deg),),
