@@ -202,5 +202,7 @@ def _on_grid(family: Family, designs: Array, samples: int, poses: Sequence[str])
         for mean, pose in zip(found, poses, strict=True):
             # Not by einsum: from 8192 samples on it sums one row in another order than several.
             values = np.sqrt(np.square(columns[pose]).sum(axis=1) / samples)
-            mean[part] = np.where(status[part] == st.OK, values, np.nan)
+            turns = winds & (np.abs(columns[pose][:, -1] - columns[pose][:, 0]) > np.pi)
+            lost = turns if family.pose_output[pose].wraps else np.zeros_like(turns)
+            mean[part] = np.where((worst == st.OK) & ~lost, values, np.nan)
     return found, status

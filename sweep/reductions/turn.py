@@ -13,7 +13,7 @@ from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Status
 from sweep.errors import MissingInput
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.numerics.records import Indices, Mask
+from sweep.numerics.records import Indices, Mask, put
 from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Request, WindowAngle, requests
 from sweep.quantities.resolve import STAY, resolve
 from sweep.reductions.extrema import true_extrema
@@ -123,9 +123,27 @@ def _extrema(
     if not requests:
         return {}, np.zeros(len(designs), np.uint8)
     if accuracy.samples is not None:
-        return sampled_extrema(family, designs, requests, accuracy.samples, window)
-    assert accuracy.target is not None
-    return true_extrema(family, designs, requests, accuracy.target, window=window)
+        found, status = sampled_extrema(family, designs, requests, accuracy.samples, window)
+    else:
+        assert accuracy.target is not None
+        found, status = true_extrema(family, designs, requests, accuracy.target, window=window)
+    # An angle that makes full turns has no extrema, but what was searched together with it has.
+    turning = np.flatnonzero(status == st.NOT_OSCILLATING)
+    groups = _apart_from_angles(family, requests)
+    if turning.size and len(groups) > 1:
+        part = None if window is None else window.only(turning)
+        for some in groups:
+            for request, extremum in _extrema(family, designs[turning], some, accuracy, part)[0].items():
+                put(found[request], turning, extremum)
+    return found, status
+
+
+def _apart_from_angles(family: Family, asked: Sequence[Request]) -> list[list[Request]]:
+    """Group the requests: those of each angle that wraps, and all others together."""
+    groups: dict[str, list[Request]] = {}
+    for request in asked:
+        groups.setdefault(request.pose if family.pose_output[request.pose].wraps else "", []).append(request)
+    return list(groups.values())
 
 
 def sampled_extrema(

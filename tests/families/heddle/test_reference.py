@@ -257,6 +257,20 @@ def test_heddle_of_long_arms_keeps_its_discriminant_and_its_speed(arm):
             assert abs(got["dchi"][0, k] - rate) <= 64.0 * 2.0**-53 * a / root
 
 
+@pytest.mark.parametrize("accuracy", [{"accuracy": 1e-9}, {"samples": 360}])
+def test_heddle_whose_bell_crank_turns_fully_keeps_its_other_outputs(accuracy):
+    """An angle without extrema took those of all outputs that were searched with it."""
+    drag = {"O2B": 0.97, "BC": 1.79, "O3C": 2.04, "O2O3": 0.61, "O4E": 0.94, "chi_mid": 0.0, "side_C": -1.0}
+    others = ["max_dchi", "min_x_c", "rms_d2chi", "rms_y"]
+    alone = sweep.summarise("heddle", drag, others, **accuracy)
+    both = sweep.summarise("heddle", drag, ["max_chi", "rms_chi", "range_lam", *others], **accuracy)
+    assert alone.status[0] == st.OK
+    assert both.status[0] == st.NOT_OSCILLATING
+    assert both[["max_chi", "rms_chi", "range_lam"]].isna().all(axis=None)
+    # the same search for each; means of a grid are sums of the same samples
+    np.testing.assert_array_equal(both[others], alone[others])
+
+
 def test_heddle_rounded_parallelogram_stays_one_beyond_its_dead_points():
     """The levers pass the frame's line: rounded arms left the other lever behind, so errors were those of a jump."""
     lengths = {"O2B": 36.2, "BC": 150.97, "O3C": 60.03, "O2O3": 162.85, "O4E": 154.71, "chi_mid": 2.1, "side_C": -1.0}
