@@ -72,10 +72,10 @@ def own_route(
 ) -> Route:
     """Make the route of a family's own step, or of a step of a chain's first stage."""
     position = [other.name for other in steps_of(stage.family)].index(step.name)
-    run, cost = (
-        partial(_run_step, step, stage, _step_outputs(step, stage, outputs)),
-        step_ns(stage.family, step, accuracy, jumps),
-    )
+    named, cost = _step_outputs(step, stage, outputs), step_ns(stage.family, step, accuracy, jumps)
+    refined = accuracy.target is not None and not accuracy.certify
+    maxima = {output.maximum: output.pose for output in named if output.pose and refined}
+    run = partial(_run_step, step, stage, named, maxima)
     route = Route(step.name, outputs, cost, run, order=(step.work, position))
     if not stage.tail:
         return route
@@ -148,11 +148,11 @@ def _sharpened(family: Family, step: Step, name: str) -> str:
 
 
 def _run_step(
-    step: Step, stage: Stage, outputs: tuple[_StepOutput, ...], designs: Array, accuracy: Accuracy, window: Window
-) -> Columns:
+    step: Step, stage: Stage, outputs: tuple[_StepOutput, ...], maxima: dict[str, str], designs: Array,
+    accuracy: Accuracy, window: Window,
+) -> Columns:  # fmt: skip
+    """Run a step; ``maxima`` are those that precise poses may replace, with their pose outputs."""
     part = stage.designs(designs)
-    refined = accuracy.target is not None and not accuracy.certify
-    maxima = {output.maximum: output.pose for output in outputs if output.pose and refined}
     wanted = frozenset((*(output.plain for output in outputs), *maxima))
     results = step.run(part, wanted, accuracy)
     if accuracy.target is not None:
