@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kernels import status as st
-from kernels.arithmetic.complex_step import unit_near
-from kernels.arithmetic.vectors import Vector, dot, norm, scale, sub
+from kernels.arithmetic.complex_step import divisor, unit_near
+from kernels.arithmetic.vectors import Vector, cross, dot, norm, scale, sub
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
-from kernels.linkage.thread_path import bend, length, slope, wrap_angle
+from kernels.linkage.thread_path import length, wrap_angle
 from kernels.types import Array, Status
 
 
@@ -71,13 +71,32 @@ def eyelet(r: Reduced, u: float, v: float) -> tuple[Vector, Vector, Vector]:
     return place, on_circle(r, -s, c), (-x, -y, -z)
 
 
+@inline
+def _branch(place: Vector, first: Vector, second: Vector, guide: Vector) -> tuple[float, float]:
+    """First and second derivative of the distance of eyelet and guide; (6 a).
+
+    Of the two forms of the second derivative the one with the smaller terms is taken: one loses digits where the guide
+    is near the crank's axis, the other where the eyelet is near the guide.
+    """
+    d = sub(place, guide)
+    square, across, along = dot(d, d), cross(d, first), -dot(guide, first)
+    per_square = 1.0 / divisor(square)
+    inward, turning = dot(d, second), dot(across, across) * per_square
+    pull, sliding = -dot(guide, second), along * along * per_square
+    bend = inward + turning
+    if abs(pull.real) + abs(sliding.real) < abs(inward.real) + abs(turning.real):
+        bend = pull - sliding
+    per = 1.0 / divisor(np.sqrt(square))
+    return along * per, bend * per
+
+
 # Pose outputs, each (n, m), or None, which is not computed.
 Outputs = namedtuple("Outputs", "P dP d2P L wrap X_E Y_E Z_E")
 
 
 @kernel
 def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: Outputs) -> None:
-    """Thread taken up, its derivatives, wrap angle and place of the eyelet; (1) to (6) of docs/takeup.md.
+    """Thread taken up, its derivatives, wrap angle and place of the eyelet; (1) to (6 a) of docs/takeup.md.
 
     Parameters
     ----------
@@ -107,8 +126,10 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
             good = 1.0 if code == st.OK else math.nan
             write(out.P, i, j, good * (length(place, r.n1, r.n2) - r.store) * r.unit)
             write(out.L, i, j, good * length(place, r.n1, r.n2) * r.unit)
-            write(out.dP, i, j, good * slope(place, r.n1, r.n2, first) * r.unit)
-            write(out.d2P, i, j, good * bend(place, r.n1, r.n2, first, second) * r.unit)
+            slope1, bend1 = _branch(place, first, second, r.n1)
+            slope2, bend2 = _branch(place, first, second, r.n2)
+            write(out.dP, i, j, good * (slope1 + slope2) * r.unit)
+            write(out.d2P, i, j, good * (bend1 + bend2) * r.unit)
             write(out.wrap, i, j, good * wrap_angle(place, r.n1, r.n2))
             write(out.X_E, i, j, good * place[0] * r.unit)
             write(out.Y_E, i, j, good * place[1] * r.unit)

@@ -219,7 +219,7 @@ def _joints(r: Reduced, g: Any, ball: Ball, u: Any, v: Any, c: Any, s: Any) -> t
 def _derivatives(
     r: Reduced, ball: Ball, u: Any, v: Any, c: Any, s: Any, p: Any, is_bar: bool
 ) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """First three derivatives of psi, then of rho in units of the crank, (5), (6)."""
+    """First three derivatives of psi, then of rho in units of the crank, (5)-(6 a)."""
     z, q = ball.z, ball.q
     # at a dead point (p = 0) the position stands and the derivatives do not exist
     per_p = 1.0 / p if ball.code == st.OK else math.nan * p
@@ -233,14 +233,31 @@ def _derivatives(
     # the ball's velocity and acceleration along and across the slot; its jerk is minus its velocity
     along1, across1 = r.ka * u * s - r.a * v * c, r.a * v * s + r.ka * u * c
     along2, across2 = -(r.a * u * c + r.ka * v * s), r.a * u * s - r.ka * v * c
+    # halves of the derivatives of the ball's squared distance from the driven axis, without a^2, which cancels in them
+    far, side, tilted = r.a * r.e, r.y0 * r.ka, r.na * r.na
+    h1 = (far * v + side * u) - tilted * (u * v)
+    h2 = (far * u - side * v) - tilted * (u * u - v * v)
+    h3 = 4.0 * tilted * (u * v) - (far * v + side * u)
     w = (across1 - q1) * per_p
-    p1 = along1 + w * q
+    p1 = _smaller_terms(along1, w * q, h1 * per_p, -(q * q1) * per_p)
     w1 = (across2 - w * (along1 + p1) - q2) * per_p
-    p2 = along2 + w * (across1 + q1) + w1 * q
+    swung = w * (across1 + q1) + w1 * q
+    p2 = _smaller_terms(along2, swung, (h2 - q * q2 - q1 * q1) * per_p, -(p1 * p1) * per_p)
     bend = across1 * (1.0 + w * w) + 2.0 * w * along2 + w1 * (along1 + 2.0 * p1) + w * p2 + q3
     w2 = -bend * per_p
     turning = 2.0 * w * across2 + w1 * across1 + w2 * q + 2.0 * w1 * q1 + w * q2
-    return w, w1, w2, p1, p2, turning - along1 * (1.0 + w * w)
+    p3 = _smaller_terms(
+        turning, -along1 * (1.0 + w * w), (h3 - q * q3 - 3.0 * q1 * q2) * per_p, -3.0 * (p1 * p2) * per_p
+    )
+    return w, w1, w2, p1, p2, p3
+
+
+@inline
+def _smaller_terms(one: Any, two: Any, other_one: Any, other_two: Any) -> Any:
+    """Sum of two terms, of two pairs with the same sum that whose terms are smaller: it loses fewer digits."""
+    if abs(other_one.real) + abs(other_two.real) < abs(one.real) + abs(two.real):
+        return other_one + other_two
+    return one + two
 
 
 @kernel

@@ -16,7 +16,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import unit_near
-from kernels.arithmetic.vectors import Vector, cross, dot, mix, scale
+from kernels.arithmetic.vectors import Vector, cross, dot, mix, scale, turned
 from kernels.jit import inline, kernel
 from kernels.linkage import bodies as tree
 from kernels.linkage.outputs import put_block
@@ -24,7 +24,7 @@ from kernels.types import EPS, Array, Numbers, Status
 
 
 class Reduced(NamedTuple):
-    """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g); (5)."""
+    """Per-design numbers in units of ``unit``: B = (a u, y0 + ka v, lift - na v), Q = (e, 0, g)."""
 
     a: float
     e: float
@@ -35,10 +35,9 @@ class Reduced(NamedTuple):
     g: float
     sa: float
     ca: float
-    side: float  # p2, of Q in the frame of the crank
-    rise: float  # p3
+    side: float  # of Q in the frame of the crank, square to x and to the crank's axis
+    rise: float  # along the crank's axis
     power: float  # D
-    frame: float  # D + a^2
     length: float  # Lw
     size: float  # sum of the magnitudes whose rounding errors make up the vector from B to Q
     unit: float
@@ -56,11 +55,17 @@ def reduce_design(designs: Numbers, i: int) -> Reduced:
     valid = 0.0 < a.real <= 1.0 and size < 1e140 and abs(length.real) < 1e140
     valid = valid and abs(alpha.real) < 1e5 and unit < math.inf
     side, rise = -g * sa, g * ca - f
-    across = side * side + rise * rise
-    power, frame = (e - a) * (e + a) + across, e * e + across
-    return Reduced(
-        a, e, f * sa, a * ca, f * ca, a * sa, g, sa, ca, side, rise, power, frame, length, size, unit, valid
-    )  # fmt: skip
+    power = (e - a) * (e + a) + (side * side + rise * rise)
+    return Reduced(a, e, f * sa, a * ca, f * ca, a * sa, g, sa, ca, side, rise, power, length, size, unit, valid)
+
+
+class Turning(NamedTuple):
+    """Length of the rod with its derivatives, and the derivatives of its direction."""
+
+    rod: tuple[Any, Any, Any, Any]
+    first: Vector
+    second: Vector
+    third: Vector
 
 
 @inline
@@ -72,27 +77,14 @@ def _along(r: Reduced, u: Any, v: Any) -> Any:
 
 
 @inline
-def _turning(
-    r: Reduced, u: Any, v: Any, length: Any, per: Any, h1: Any
-) -> tuple[tuple[Any, Any, Any, Any], Any, Vector, Vector, Vector]:
-    """Length of the rod with its derivatives, w.w, and the angular velocity w of the rod with its derivatives; (5)-(7).
+def _near_the_block(r: Reduced, u: Any, v: Any, n: Vector, length: Any, per: Any) -> Turning:
+    """Rod and its direction from the angular velocity of the rod, for a pin near the block; (5)-(7).
 
     No terms cancel but those that cancel in the design itself.
     """
-    square, ahead = per * per, r.e * u + r.side * v
+    h1, square = r.a * (r.e * v - r.side * u) * per, per * per
     m, lean, pull = h1 * per, r.a * square * r.rise, r.power * square
-    # Three forms of one number: the first is the difference of large terms unless the pin is near the block's centre,
-    # the others unless the crank or the frame is short.  The one with the smallest terms is taken.
     k, more = 0.5 * (pull - 1.0), 0.5 * (pull + 1.0)
-    size = abs((r.e * u).real) + abs((r.side * v).real)
-    terms = 0.5 * (1.0 + abs(pull.real)) / square.real
-    of_crank, of_frame = r.a.real * (size + r.a.real), r.frame.real + r.a.real * size
-    if of_crank < terms and of_crank <= of_frame:
-        k = r.a * square * (ahead - r.a)
-        more = 1.0 + k
-    elif of_frame < terms:
-        more = square * (r.frame - r.a * ahead)
-        k = more - 1.0
     fast = lean * lean + k * k
     bend = lean * lean + k * more
     spoke, tangent, axis = (u, r.ca * v, -r.sa * v), (-v, r.ca * u, -r.sa * u), (0.0, r.sa, r.ca)
@@ -100,7 +92,35 @@ def _turning(
     w1 = mix(1.0, mix(-2.0 * m * lean, spoke, lean, tangent), m * pull, axis)
     w2 = mix(lean * (6.0 * m * m - 1.0 - 2.0 * bend), spoke, -4.0 * m * lean, tangent)
     w2 = mix(1.0, w2, pull * (bend - 3.0 * m * m), axis)
-    return (length, h1, length * bend, -h1 * (1.0 + 3.0 * bend)), fast, w, w1, w2
+    n1 = cross(w, n)
+    n3 = mix(1.0, mix(1.0, cross(w2, n), -3.0 * dot(w, w1), n), -fast, n1)
+    rod = (length, h1, length * bend, -h1 * (1.0 + 3.0 * bend))
+    return Turning(rod, n1, mix(1.0, cross(w1, n), -fast, n), n3)
+
+
+@inline
+def _far_from_the_block(r: Reduced, u: Any, v: Any, length: Any, per: Any) -> Turning:
+    """Rod and its direction in the crank's own directions, where E' has one component only; (8), (9)."""
+    ahead, y, z, square = r.e * u + r.side * v, r.side * u - r.e * v, r.rise, per * per
+    x = ahead - r.a
+    reach, m, p = x * x + z * z, -(r.a * y) * square, r.a * square * per
+    m1, turn = r.a * ahead * square - 2.0 * m * m, y * y - x * ahead
+    # Two forms of rho''/rho; the one with the smaller terms is taken.
+    bend, across = r.a * square * ahead - m * m, r.a * reach * square
+    if abs(x.real) + across.real < abs(ahead.real) + (r.a * y * y * square).real:
+        bend = r.a * square * (x + across)
+    a, b, c = y * y + z * z - r.a * x - 3.0 * m * (x * y), x * y - 3.0 * m * reach, ahead + 3.0 * m * y
+    a1 = -y * (2.0 * ahead + r.a) - 3.0 * (m1 * x * y + m * (turn + a))
+    b1 = turn - 3.0 * (m1 * reach + m * (2.0 * x * y + b))
+    c1 = y + 3.0 * (m1 * y - m * (ahead + c))
+    spoke, tangent, axis = (u, r.ca * v, -r.sa * v), (-v, r.ca * u, -r.sa * u), (0.0, r.sa, r.ca)
+    h1 = m * length
+    return Turning(
+        (length, h1, length * bend, -h1 * (1.0 + 3.0 * bend)),
+        scale(p, turned(spoke, tangent, axis, (x * y, -reach, y * z))),
+        scale(p, turned(spoke, tangent, axis, (a, -b, -(z * c)))),
+        scale(p, turned(spoke, tangent, axis, (a1 + b, a - b1, -(z * c1)))),
+    )
 
 
 # Blocks (k, n, m) of outputs, or None, which is not computed.
@@ -111,7 +131,7 @@ Outputs = namedtuple("Outputs", "rod point velocity acceleration jerk joints")
 def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, out: Outputs) -> None:
     """Rod between crank pin and block, and the working point, with derivatives, of every design and crank angle.
 
-    Equations (1)-(7) of docs/swivel.md.
+    Equations (1)-(9) of docs/swivel.md.
 
     Parameters
     ----------
@@ -146,16 +166,15 @@ def poses(designs: Numbers, cos_phi: Numbers, sin_phi: Numbers, status: Status, 
             length = np.sqrt(square) if code == st.OK else square * math.nan
             per = 1.0 / length if code == st.OK else length
             n = scale(per, reach)
-            # n . E' without the part of E that is the crank's own, which is square to E'
-            rod, fast, w, w1, w2 = _turning(r, u, v, length, per, r.a * (r.e * v - r.side * u) * per)
-            put_block(out.rod, i, j, rod, r.unit)
-            n1 = cross(w, n)
-            n2 = mix(1.0, cross(w1, n), -fast, n)
-            n3 = mix(1.0, mix(1.0, cross(w2, n), -3.0 * dot(w, w1), n), -fast, n1)
+            if 4.0 * square.real < (r.a * r.a).real:
+                at = _near_the_block(r, u, v, n, length, per)
+            else:
+                at = _far_from_the_block(r, u, v, length, per)
+            put_block(out.rod, i, j, at.rod, r.unit)
             put_block(out.point, i, j, mix(1.0, pin, r.length, n), r.unit)
-            put_block(out.velocity, i, j, mix(r.length, n1, -1.0, reach1), r.unit)
-            put_block(out.acceleration, i, j, mix(r.length, n2, -1.0, reach2), r.unit)
-            put_block(out.jerk, i, j, mix(r.length, n3, 1.0, reach1), r.unit)
+            put_block(out.velocity, i, j, mix(r.length, at.first, -1.0, reach1), r.unit)
+            put_block(out.acceleration, i, j, mix(r.length, at.second, -1.0, reach2), r.unit)
+            put_block(out.jerk, i, j, mix(r.length, at.third, 1.0, reach1), r.unit)
             placed = scale(r.unit if code == st.OK else math.nan, pin)
             put_block(out.joints, i, j, placed + n, 1.0)
 

@@ -41,14 +41,19 @@ def ladder(mechanism, name):
     return names
 
 
-def factors(name, design, phi, expected, got):
-    """Return errors of the outputs in units of 2^-53 max(cond, |y|), maximised over the lower orders too."""
+def factors(name, design, phi, expected, got, positions=True):
+    """Return errors of the outputs in units of 2^-53 max(cond, |y|), maximised over the lower orders too.
+
+    Without ``positions`` a derivative is measured by derivatives alone, not by the position it belongs to.
+    """
     mechanism = family(name)
     cond = conditions(name, design, phi, list(expected))
     found = {}
     for output in (o for o in expected if o not in mechanism.derivative_of.values()):
         size = mp.mpf(1) if mechanism.pose_output[output].unit == "rad" else mp.mpf(0)
-        for one in ladder(mechanism, output):
+        for order, one in enumerate(ladder(mechanism, output)):
+            if order == 1 and not positions:
+                size = mp.mpf(0)
             size = max(size, mp.mpf(cond[one]), abs(expected[one]))
             error = abs(mp.mpf(float(got[one])) - expected[one])
             found[one] = float(error / (EPS * size)) if error else 0.0
