@@ -128,8 +128,12 @@ def driven(bar: FourBar, u: Any, v: Any) -> tuple[Any, Any, Any, Any, int]:
     # SINGULAR: the driving pin on the driven pivot leaves the arm free; a dead point has one position.
     code = pose_status(True, delta.real, tolerance, rr.real)
     t = bar.side * (np.sqrt(delta) if code == st.OK else 0.0 * delta)
-    per_rr = 1.0 / rr if code in (st.OK, st.DEAD_POINT) else math.nan * rr
-    return -(x * w + y * t) * per_rr, (x * t - y * w) * per_rr, t, delta, code
+    if code not in (st.OK, st.DEAD_POINT):
+        return math.nan * x, math.nan * x, t, delta, code
+    # W and t are rounded apart: of long arms their squares add up to R^2 only to R/c of their digits
+    cos, sin = -(x * w + y * t), x * t - y * w
+    per = 1.0 / np.sqrt(cos * cos + sin * sin)
+    return cos * per, sin * per, t, delta, code
 
 
 @inline

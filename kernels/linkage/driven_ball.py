@@ -39,6 +39,22 @@ class Swung(NamedTuple):
 
 
 @inline
+def long_rocker(b: Any, c: Any, z: Any, rr: Any, size: float) -> tuple[Any, Any, float]:
+    """R^2 - W^2, c - W and the rounding error of the first, of a rocker at least twice as long as its coupler.
+
+    R^2 = rr is the squared distance of the driving ball from the rocker's axis, W = (c^2 + R^2 + z^2 - b^2)/(2 c), and
+    ``size`` is the sum of the magnitudes whose rounding errors make up the ball's place.  R, W and c are alike but for
+    the coupler, so they are not subtracted as they are: with p = R - c and l = b^2 - z^2 - p^2, c - W = l/(2 c) - p and
+    R^2 - W^2 = l ((R + c - b)(R + c + b) + z^2)/(4 c^2).
+    """
+    reach = np.sqrt(rr)
+    past, far, t = reach - c, reach + c, 8.0 * EPS
+    left = (b - z) * (b + z) - past * past
+    error = b.real * b.real + (abs(past.real) + abs(z.real)) * (size + c.real) + t * size * size
+    return left * ((far - b) * (far + b) + z * z) / (4.0 * c * c), 0.5 * left / c - past, t * error
+
+
+@inline
 def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
     """Angle of the rocker for one place of the driving ball.
 
@@ -65,6 +81,10 @@ def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
     tolerance = t * ((abs(x.real) + abs(y.real)) * size + abs(w.real) * w_size) + t * t * (
         2.0 * size * size + w_size * w_size
     )
+    inward = c - w  # d.k of the vector d from M to C, as d.tau is the root
+    if 2.0 * b.real < c.real:
+        delta, inward, tolerance = long_rocker(b, c, z, rr, size)
+        w = c - inward
     # a rocker without length has no direction
     code = st.SINGULAR if c.real == 0.0 else pose_status(True, delta.real, tolerance, rr.real)
     moving = code == st.OK
@@ -72,10 +92,11 @@ def swing(path: Path, size: float, b: Any, c: Any, branch: float) -> Swung:
     root = branch * np.sqrt(delta) if moving else 0.0 * delta
     per_rr = 1.0 / rr if has_angle else np.nan * rr
     cos, sin = (x * w - y * root) * per_rr, (y * w + x * root) * per_rr
-    # d from M to C: d.k = c - w, d.tau = root; d.d = b^2 gives d.d' = 0, d.d'' = -d'.d', d.d''' = -3 d'.d''
-    inward = c - w
     across = inward * inward + z * z if has_angle else np.nan * rr
+    # d.d = b^2 gives d.d' = 0, d.d'' = -d'.d', d.d''' = -3 d'.d''
     d = (c * cos - x, c * sin - y, -z)
+    if 2.0 * b.real < c.real:
+        d = (inward * cos - root * sin, inward * sin + root * cos, -z)
     per = 1.0 / (c * root) if moving else np.nan * rr
     p = dot(d, m1) * per
     turn = c * p

@@ -96,7 +96,9 @@ def bar_angle(r: Reduced, h: Driven, e: Driven) -> Turned:
     code = follower_status(True, not (w.real > 0.0 and f.real > 0.0), product.real, 16.0 * EPS * size**4)
     root = r.bar_branch * (np.sqrt(product) if code == st.OK else 0.0 * product)
     a1, a2 = 2.0 * (wx * r.fx + wy * r.fy), 2.0 * (wy * r.fx - wx * r.fy)
-    a3 = r.q * r.q - f * f - w * w
+    # q^2 - |f|^2 - |w|^2 without the square of the longer one, which may be all but that of q
+    longer, shorter = (w, f) if w.real > f.real else (f, w)
+    a3 = (r.q - longer) * (r.q + longer) - shorter * shorter
     per_rr = 1.0 / (4.0 * (w * f) * (w * f)) if code in (st.OK, st.DEAD_POINT) else math.nan * w
     cos, sin = (a1 * a3 - a2 * root) * per_rr, (a2 * a3 + a1 * root) * per_rr
     gx, gy = cos * r.fx - sin * r.fy, sin * r.fx + cos * r.fy

@@ -62,6 +62,26 @@ def test_cylindrical_looper_equals_joint_geometry():
         assert max(found.values()) <= 16.0, (design, phi, found)
 
 
+@pytest.mark.parametrize("long", [30.0, 300.0, 900.0])
+def test_cylindrical_looper_with_a_long_rocker_on_a_far_shaft_keeps_its_digits(long):
+    # A rocker that stays is a crank-rocker, whose poses keep their digits by twice as many: the difference of the
+    # squares of rocker and frame had lost 300 units.  Both add a few roundings to those of the inputs: 16 asked.
+    generator, checked = np.random.default_rng(5), 0
+    for _ in range(8):
+        links = {"a": 1.0, "b": 3.0, "c": long, "e": generator.uniform(-2.0, 2.0) - long, "f": 0.5, "g": -0.3}
+        links |= {"alpha": generator.choice([0.0, 0.3]), "branch": generator.choice([-1.0, 1.0])}
+        phi, angles = generator.uniform(-9.0, 9.0), ["psi", "dpsi", "d2psi", "d3psi"]
+        rocker = sweep.evaluate("rssr", links, angles, phi=[phi]).iloc[0]
+        design = tuple((TABLE | {f"{name}1": x for name, x in links.items()} | {"slides": 0.0}).values())
+        row = evaluated(design, phi, angles).iloc[0]
+        if row.status == rocker.status == st.OK:
+            expected = {name: mp.mpf(rocker[name]) for name in angles}
+            found = factors("cylindrical_looper", design, phi, expected, row, positions=False)
+            assert max(found.values()) <= 16.0, (design, phi, found)
+            checked += 1
+    assert checked >= 4
+
+
 def test_cylindrical_looper_keeps_its_distance_from_the_shaft():
     for design, phi in loopers(20, 2):
         table = dict(zip(NAMES, design, strict=True))

@@ -19,6 +19,7 @@ from kernels.families.feed.motion import EVENTS, OUTPUTS
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.reference import feed as naive
+from tests.support.family_checks import factors
 
 ROWS = [r for r in json.loads((Path(__file__).parents[2] / "oracle" / "feed_open.json").read_text())["rows"]
         if r["kind"] == "rack"]  # fmt: skip
@@ -112,6 +113,27 @@ def test_feed_equals_points_and_circles_with_a_spatial_chain_too(changes, phi):
         for order, prefix in ((1, "d"), (2, "d2")):
             expected = complex(slopes[order] * mp.factorial(order))
             assert abs(complex(*pair(got, "t", prefix)) - expected) < 1e-10 * max(1.0, abs(expected))
+
+
+def test_feed_with_a_long_rocker_on_a_far_axis_keeps_its_digits():
+    # The horizontal chain is a crank-rocker, whose poses keep their digits by twice as many: the difference of the
+    # squares of rocker and frame had lost 200 units.  Both add a few roundings to those of the inputs: 16 asked.
+    generator, checked = np.random.default_rng(7), 0
+    for _ in range(12):
+        c, phi = 10.0 ** generator.uniform(1.5, 3.0), generator.uniform(-9.0, 9.0)
+        chain = {"a": 0.7, "b": 2.5, "c": c, "e": generator.uniform(-1.5, 1.5) - c, "branch": generator.choice([-1, 1])}
+        given = chain | {"f": 0.0, "g": 0.0, "alpha": 0.0}
+        rocker = sweep.evaluate("rssr", given, ["psi", "dpsi", "d2psi"], phi=[phi]).iloc[0]
+        own = {f"h_{name}": x for name, x in chain.items() if name != "branch"} | {"h_sigma": chain["branch"]}
+        p = RACK | own | {"dh": 0.0, "xE": chain["e"] + 3.2, "yE": 0.0, "q": 1.7}
+        got = sweep.evaluate("feed", p, ["psi_plus_dh", "dpsi", "d2psi"], phi=[phi]).iloc[0]
+        if rocker.status != st.OK or got.status != st.OK:
+            continue
+        expected = {"psi_plus_dh": mpf(rocker.psi), "dpsi": mpf(rocker.dpsi), "d2psi": mpf(rocker.d2psi)}
+        found = factors("feed", [p[name] for name in FIELDS], phi, expected, got, positions=False)
+        assert max(found.values()) <= 16.0, (p, phi, found)
+        checked += 1
+    assert checked >= 4
 
 
 def test_feed_events_equal_plain_root_finding_and_quadrature():

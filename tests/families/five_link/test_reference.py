@@ -17,6 +17,7 @@ from kernels.families.five_link import motion
 from sweep.families import family
 from sweep.families.base import Angles
 from tests.reference import five_link as naive
+from tests.support.family_checks import factors
 from tests.support.rssr_designs import random_designs
 
 ROWS = json.loads((Path(__file__).parents[2] / "oracle" / "fivelink_open.json").read_text())["rows"]
@@ -174,6 +175,25 @@ def test_five_link_derivatives_match_numerical_differentiation_in_fifty_digits()
             # 2^-53 times a sensitivity that this far from dead points stays below 1e5, times the slope of d3psi
             assert float(abs(row[name] - expected[name])) < 1e-9 * (1.0 + abs(row.d3psi)), name
     assert checked > 10
+
+
+@pytest.mark.parametrize("h", [0.2, -0.3])
+def test_five_link_with_a_long_rocker_on_a_far_axis_keeps_its_digits(h):
+    # The terms of the closure are as long as the rocker and had left the coupler to a few of their digits: 800 units.
+    # The inputs are rounded once, the vector along the coupler adds a few roundings of the same size: 16 asked.
+    generator, checked = np.random.default_rng(6), 0
+    for _ in range(12):
+        c, branch = 10.0 ** generator.uniform(1.5, 3.0), generator.choice([-1.0, 1.0])
+        e, phi = generator.uniform(-1.5, 1.5) - c, generator.uniform(-9.0, 9.0)
+        design = (1.0, 2.5, c, e, 0.4, -0.3, generator.choice([0.0, 0.5]), h, 0.0)
+        table = dict(zip(GEOMETRY, design, strict=True)) | {"branch": branch}
+        row = sweep.evaluate("five_link", table, [*ORDERS], phi=[phi]).iloc[0]
+        if row.status == st.OK:
+            expected = naive.outputs(design, phi, row.psi)
+            found = factors("five_link", (*design, branch, 1.0), phi, expected, row, positions=False)
+            assert max(found.values()) <= 16.0, (design, phi, found)
+            checked += 1
+    assert checked >= 6
 
 
 def test_five_link_kernel_jitted_equals_plain_python():

@@ -271,6 +271,17 @@ def test_heddle_whose_bell_crank_turns_fully_keeps_its_other_outputs(accuracy):
     np.testing.assert_array_equal(both[others], alone[others])
 
 
+def test_heddle_lift_of_a_long_shaft_lever_is_that_of_its_angle():
+    """A direction of another length than 1 lifted by 60 units too much; a sine near 1 forgives its angle's rounding."""
+    long = {"O2B": 2.423058346717621, "BC": 2.855187349212298, "O3C": 0.6650897510175262, "O2O3": 1.3834714473222205}
+    long |= {"O4E": 0.6104000708191432, "chi_mid": -0.9318545725884384, "O3D": 1.0, "O4F": 2000.0, "O3O4": 0.3}
+    got = sweep.evaluate("heddle", long | {"DF": 1999.6701431976626}, ["y", "lam"], phi=[-1.2544152755692288]).iloc[0]
+    assert got.status == st.OK
+    assert abs(got.lam) > 1.5
+    # sine, product and the addition theorem round once each
+    assert got.y == pytest.approx(long["O4E"] * math.sin(got.lam), rel=4.0 * 2.0**-53)
+
+
 def test_heddle_rounded_parallelogram_stays_one_beyond_its_dead_points():
     """The levers pass the frame's line: rounded arms left the other lever behind, so errors were those of a jump."""
     lengths = {"O2B": 36.2, "BC": 150.97, "O3C": 60.03, "O2O3": 162.85, "O4E": 154.71, "chi_mid": 2.1, "side_C": -1.0}
