@@ -31,6 +31,7 @@ from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
 from kernels.arithmetic.sincos import sincos
 from kernels.curves.arc_roots import angle_at, arc_search, way_of
+from kernels.curves.polynomials import rotate
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, unit_scale
 from kernels.types import EPS, Array, Numbers, Status
@@ -92,6 +93,13 @@ def axial_reach(joint: Joint, s: Any) -> tuple[Any, Any]:
 
 
 @inline
+def reaches(joint: Joint, s: float) -> bool:
+    """Whether rho is positive beyond rounding at the rocker angle of sine s."""
+    _, square = axial_reach(joint, s)
+    return bool(square > 32.0 * EPS * joint.coupler * joint.coupler)
+
+
+@inline
 def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
     """G5, its first two derivatives and rho at the rocker angle of cosine c and sine s, where rho^2 > 0; (1), (2)."""
     z, square = axial_reach(joint, s)
@@ -104,6 +112,21 @@ def slope(joint: Joint, x: Any, y: Any, w: Any, c: Any, s: Any) -> Slope:
     value = along + (w - joint.shift) - joint.share * rho
     first = -(x * s + y * c) - joint.share * rho1
     return Slope(value, first, -along - joint.share * rho2, rho, rho1, rho2, z)
+
+
+@inline
+def polished(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, v: Any, c: Any, s: Any) -> tuple[Any, Any, Any]:
+    """Refine the rocker angle of a rocker longer than its coupler: minus cosine, minus sine, dG5/dpsi; (1 a).
+
+    The terms of G5 are then as long as the rocker and leave the coupler to a few of their digits; the vector from crank
+    pin to ball is as long as the coupler.
+    """
+    for _ in range(2):
+        here = slope(joint, x, y, w, c, s)
+        d1, d2, reach = x + r.rocker * c, r.rocker * (r.ca * s - r.k1) - v, joint.h + here.rho
+        value = 0.5 * (d1 * d1 + d2 * d2 - reach * reach - joint.s2 * joint.s2) / r.rocker
+        c, s = rotate(c, s, -value / divisor(here.first))
+    return -c, -s, slope(joint, x, y, w, c, s).first
 
 
 @inline

@@ -11,7 +11,18 @@ from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
 from kernels.curves.arc_roots import MOST
 from kernels.curves.polynomials import rotate
-from kernels.families.five_link.closure import NONE, ONE, Joint, all_roots, axial_reach, residual_size, slope, solutions
+from kernels.families.five_link.closure import (
+    NONE,
+    ONE,
+    Joint,
+    all_roots,
+    axial_reach,
+    polished,
+    reaches,
+    residual_size,
+    slope,
+    solutions,
+)
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, discriminant_tolerance
 from kernels.linkage.verdict import pose_status
@@ -50,13 +61,6 @@ def _newton(joint: Joint, x: float, y: float, w: float) -> tuple[bool, float, fl
         if abs(step) < NEAR:
             return True, c, s
     return False, c, s
-
-
-@inline
-def reaches(joint: Joint, s: float) -> bool:
-    """Whether rho is positive beyond rounding at the rocker angle of sine s."""
-    _, square = axial_reach(joint, s)
-    return bool(square > 32.0 * EPS * joint.coupler * joint.coupler)
 
 
 @kernel
@@ -133,21 +137,6 @@ def solve_general(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, at: Array) -
 
 
 @inline
-def _polished(r: Reduced, joint: Joint, x: Any, y: Any, w: Any, v: Any, c: Any, s: Any) -> tuple[Any, Any, Any]:
-    """Refine the rocker angle of a rocker longer than its coupler: minus cosine, minus sine, dG5/dpsi; (1 a).
-
-    The terms of G5 are then as long as the rocker and leave the coupler to a few of their digits; the vector from crank
-    pin to ball is as long as the coupler.
-    """
-    for _ in range(2):
-        here = slope(joint, x, y, w, c, s)
-        d1, d2, reach = x + r.rocker * c, r.rocker * (r.ca * s - r.k1) - v, joint.h + here.rho
-        value = 0.5 * (d1 * d1 + d2 * d2 - reach * reach - joint.s2 * joint.s2) / r.rocker
-        c, s = rotate(c, s, -value / divisor(here.first))
-    return -c, -s, slope(joint, x, y, w, c, s).first
-
-
-@inline
 def real_joint(joint: Joint) -> Joint:
     """Constants of the joint without their imaginary parts."""
     return Joint(
@@ -182,7 +171,7 @@ def solve(r: Reduced, joint: Joint, u: Any, v: Any, at: Array) -> tuple[int, Any
         # without its offsets it is the crank-rocker, bit for bit
         offset = joint.share.real != 0.0 or joint.s2.real != 0.0
         if code == st.OK and offset and 2.0 * joint.coupler.real < r.rocker.real:
-            c, s, t = _polished(r, joint, x, y, w, v, -c, -s)
+            c, s, t = polished(r, joint, x, y, w, v, -c, -s)
     if code != st.OK and code != st.DEAD_POINT:
         c, s, t = math.nan * x, math.nan * x, math.nan * x
     return code, c, s, t, w
