@@ -15,8 +15,8 @@ from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, divisor, hypotenuse
 from kernels.arithmetic.vectors import add, cross, dot, mix, scale, spun, sub
 from kernels.curves.arc_roots import MOST
-from kernels.families.five_link.closure import Joint, axial_reach, extremes, reduce_design, slope
-from kernels.families.five_link.solve import pose_terms, reaches, real_joint, solve
+from kernels.families.five_link.closure import Joint, axial_reach, extremes, reaches, reduce_design, slope
+from kernels.families.five_link.solve import pose_terms, real_joint, solve
 from kernels.jit import inline, kernel
 from kernels.linkage import bodies as tree
 from kernels.linkage.crank_closure import Reduced
