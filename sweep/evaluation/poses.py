@@ -15,7 +15,7 @@ from sweep.errors import InputError, MissingInput, nearest
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians, plain_names
 from sweep.evaluation.loads import Loads, curves_of
 from sweep.evaluation.statuses import explained, meanings
-from sweep.evaluation.tables import Table, design_matrix, kept_columns, numbers, plain_columns, wanted_names
+from sweep.evaluation.tables import Table, design_matrix, frame_of, kept_columns, numbers, plain_columns, wanted_names
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Domain, Family, March
@@ -105,7 +105,7 @@ def evaluate(
     made = head | {name: columns[name].ravel() for name in [*wanted, "status"]}
     if status_text:
         made["status_text"] = np.array(meanings(made["status"]), dtype=object)
-    result = pd.DataFrame(made, index=index, copy=False)  # the arrays are not shared
+    result = frame_of(made, index, copy=False)  # the arrays are not shared
     if kept := kept_columns(given, keep, made, len(matrix)):
         inputs = pd.DataFrame(kept).loc[np.repeat(np.arange(len(matrix)), repeats)].set_axis(result.index)
         result = pd.concat([inputs, result], axis=1)

@@ -16,7 +16,7 @@ from sweep.evaluation.poses import query_of
 from sweep.evaluation.route import Route
 from sweep.evaluation.routes import design_outputs, routes, with_errors
 from sweep.evaluation.statuses import meanings
-from sweep.evaluation.tables import Table, design_matrix, index_of, kept_columns, plain_columns
+from sweep.evaluation.tables import Table, design_matrix, frame_of, index_of, kept_columns, plain_columns
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import DEFAULT_TARGET, Accuracy, Domain, March
@@ -101,8 +101,6 @@ def summarise(
     >>> found.attrs["units"]["margin"]
     '1'
     """
-    import pandas as pd
-
     bare = find_family(family)
     mechanism, wanted, units = query_of(bare, want, loads, "design")
     chosen = chosen_accuracy(mechanism.domain, samples, accuracy, certify)
@@ -119,7 +117,7 @@ def summarise(
         computed["status_text"] = np.array(meanings(columns["status"]), dtype=object)
     repeated = kept_columns(given, keep, computed, len(matrix))
     index = index_of(given, len(matrix))
-    result = pd.DataFrame(repeated | computed, index=index, copy=bool(repeated))  # the arrays made here are not shared
+    result = frame_of(repeated | computed, index, copy=bool(repeated))  # the arrays made here are not shared
     errors = {error_of(name): unit for name, unit in units.items() if error_of(name) in computed}
     result.attrs["units"] = {**units, **errors}
     return result

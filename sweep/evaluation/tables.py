@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -291,6 +292,22 @@ def index_of(table: Table, rows: int) -> pd.Index:
     import pandas as pd
 
     return table.index if isinstance(table, pd.DataFrame) else pd.RangeIndex(rows)
+
+
+def frame_of(columns: Mapping[str, Any], index: pd.Index | None, copy: bool) -> pd.DataFrame:
+    """Make a DataFrame; the names become labels once, as that would take a third of the time of a small table."""
+    import pandas as pd
+
+    frame = pd.DataFrame(dict(enumerate(columns.values())), index=index, copy=copy)
+    frame.columns = _labels(tuple(columns)).view()  # a view, because a user may name the labels
+    return frame
+
+
+@lru_cache
+def _labels(names: tuple[str, ...]) -> pd.Index:
+    import pandas as pd
+
+    return pd.Index(names)
 
 
 def refuse_rows(bad: Any, values: Array, name: str, allowed: str) -> None:

@@ -205,3 +205,10 @@ def test_chain_may_be_written_in_one_word_as_on_the_command_line() -> None:
         )
     with pytest.raises(InputError, match="did you mean 'guide'"):
         sweep.summarise("rssr+giude", table, ["stroke"])
+
+
+def test_a_name_given_to_the_labels_of_one_result_stays_there() -> None:
+    """Labels of the same names are made once for all results."""
+    found = sweep.summarise("rssr", ROCKER, ["margin"])
+    found.columns.name = "output"
+    assert sweep.summarise("rssr", ROCKER, ["margin"]).columns.name is None
