@@ -14,11 +14,6 @@ from kernels.types import TWO_PI, Array, Status
 
 _CELLS = 4096
 
-OUTPUTS = (
-    "x0", "v_entry", "omega_n", "jump_height_free", "flight_time_free", "k_min_contact", "F0_min_contact", "N_at_entry",
-    "N_at_top", "t_recontact",
-)  # fmt: skip
-
 
 @inline
 def _free(d: Array, i: int, v0: float, t: float) -> float:
@@ -73,7 +68,8 @@ def closed_forms(designs: Array, status: Status, outputs: Array) -> None:
     ----------
     designs : (n, 8) columns as `PARAMETERS` of sweep/families/foot.py, without its fabric
     status : (n,) out; OK, NO_EVENT (the rack does not pass the plate) or INVALID_INPUT
-    outputs : (10, n) out in the order of :data:`OUTPUTS`; the time of first contact is nan without a rebound
+    outputs : (10, n) out in the order of `CLOSED_OUTPUTS` of sweep/families/foot.py; the time of first
+        contact is nan without a rebound
     """
     for i in range(designs.shape[0]):
         m, k, preload, omega = designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3]

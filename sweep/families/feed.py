@@ -12,9 +12,6 @@ from itertools import combinations
 import numpy as np
 
 from kernels.families import feed
-from kernels.families.feed import triad
-from kernels.families.feed.motion import EVENTS as _EVENTS
-from kernels.families.feed.motion import OUTPUTS as _POSES
 from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
 from kernels.types import EPS, Array
 from sweep.families.base import PER_RADIAN, Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
@@ -113,16 +110,16 @@ _LENGTHS = [k for k, p in enumerate(PARAMETERS) if p.unit == "length"]
 
 
 def _poses(
-    kernel: Callable[..., object], names: tuple[str, ...], taken: tuple[str, ...],
+    kernel: Callable[..., object], outputs: tuple[Output, ...], taken: tuple[str, ...],
     designs: Array, angles: Angles, wanted: frozenset[str],
 ) -> Columns:  # fmt: skip
     """Compute the wanted pose outputs and status of every design at its crank angles, each (n, m)."""
     given = designs, *(getattr(angles, name) for name in taken)
     status = np.empty((len(designs), angles.cos.shape[1]), np.uint8)
-    return filled_all(kernel, given, names, wanted, status, np.result_type(*given))
+    return filled_all(kernel, given, tuple(o.name for o in outputs), wanted, status, np.result_type(*given))
 
 
-poses = partial(_poses, feed.poses, _POSES, ("cos", "sin"))
+poses = partial(_poses, feed.poses, POSE_OUTPUTS, ("cos", "sin"))
 
 
 def _of_chain(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, *names: str) -> list[Array]:
@@ -159,9 +156,10 @@ def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
 
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Compute entry, leaving and feed between them, with errors estimated from the rounding of a tooth's height."""
-    status, values = np.empty(len(designs), np.uint8), np.empty((len(_EVENTS), len(designs)))
+    status, values = np.empty(len(designs), np.uint8), np.empty((len(FEEDING_OUTPUTS) + 1, len(designs)))
     feed.feeding(designs, status, values)
-    columns: dict[str, Array] = dict(zip(_EVENTS, values, strict=True))
+    *events, area_error = values
+    columns: dict[str, Array] = {o.name: x for o, x in zip(FEEDING_OUTPUTS, events, strict=True)}
     with np.errstate(all="ignore"):
         height = 16.0 * EPS * np.abs(designs[:, _LENGTHS]).sum(axis=1)
         angle = height * (1.0 / np.abs(columns["entry_speed"]) + 1.0 / np.abs(columns["leave_speed"]))
@@ -171,7 +169,7 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
             "phi_entry": angle, "phi_leave": angle, "feed_angle": angle, "entry_speed": height + angle * size,
             "leave_speed": height + angle * size, "stitch_length": height + angle * size, "rise": height,
             "flatness": height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"])
-            + columns.pop("area_error"),
+            + area_error,
             "crossings": np.zeros(len(designs)),
         }  # fmt: skip
     return chosen(columns | {f"err_{name}": error for name, error in errors.items()}, wanted, status)
@@ -295,7 +293,7 @@ def _apart(designs: Array) -> Mask:
 
 def triad_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
     """Compute the wanted pose outputs and status; designs with two leads too far apart are NOT_ASSEMBLED."""
-    columns = _poses(feed.triad_poses, triad.OUTPUTS, ("phi",), designs, angles, wanted)
+    columns = _poses(feed.triad_poses, TRIAD_OUTPUTS, ("phi",), designs, angles, wanted)
     lost = columns["status"] == NOT_CONVERGED
     rows = np.flatnonzero(lost.any(axis=1))
     if rows.size:

@@ -9,16 +9,13 @@ import numpy as np
 
 from kernels.effects.foot import OUTPUTS as _EVENTS
 from kernels.effects.foot_fabric import march
-from kernels.families import feed as feed_kernels
 from kernels.families import foot
-from kernels.families.feed.motion import OUTPUTS as _RACK
-from kernels.families.foot import OUTPUTS as _CLOSED
 from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
 from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work, floats
 from sweep.families.capabilities import Fixed, Link, MovingPoint, PresserFoot, Skeleton
-from sweep.families.poses import chosen, guarded
+from sweep.families.poses import chosen, equal_steps, guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import parameter, standing
 
@@ -159,9 +156,9 @@ def _poses(
 
 def closed(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Compute entry, first jump, and limits of spring and preload in closed form."""
-    status, values = np.empty(len(designs), np.uint8), np.empty((len(_CLOSED), len(designs)))
+    status, values = np.empty(len(designs), np.uint8), np.empty((len(CLOSED_OUTPUTS), len(designs)))
     foot.closed_forms(designs, status, values)
-    columns: Columns = dict(zip(_CLOSED, values, strict=True))
+    columns: Columns = {o.name: x for o, x in zip(CLOSED_OUTPUTS, values, strict=True)}
     return happening(columns | {"status": status}, wanted)
 
 
@@ -216,16 +213,15 @@ FEED_PARAMETERS = (*feed.PARAMETERS, *FOOT, RESTITUTION, *FABRIC)
 _RACK_COLUMNS = len(feed.PARAMETERS)
 _FEET = [_RACK_COLUMNS + k for k in range(len(FOOT) + 1 + len(FABRIC))]
 _PLATE = feed.FAMILY.parameter_names.index("y_plate")
-_ROWS = [_RACK.index(name) for name in ("y_t", "dy_t", "d2y_t", "x_t", "dx_t", "d2x_t")]
+_PATH = ("y_t", "dy_t", "d2y_t", "x_t", "dx_t", "d2x_t")
 
 
 def feed_path(designs: Array, nodes: int, sense: int = 1) -> tuple[Array, np.ndarray]:
     """Compute the tooth's path above the plate at equal crank angles, (n, 6, nodes), and the linkage's status."""
-    phi = np.arange(nodes)[None, :] * (2.0 * np.pi / nodes) * sense
+    phi = sense * equal_steps(FAMILY.domain, designs, nodes)[None, :]
     rack = np.ascontiguousarray(designs[:, :_RACK_COLUMNS])
-    status, outputs = np.empty((len(designs), nodes), np.uint8), np.empty((len(_RACK), len(designs), nodes))
-    feed_kernels.poses(rack, np.cos(phi), np.sin(phi), status, outputs)
-    path = np.ascontiguousarray(outputs[_ROWS].transpose(1, 0, 2))
+    found = feed.poses(rack, Angles.of(phi), frozenset(_PATH))
+    path, status = np.stack(floats(found, *_PATH), axis=1), np.asarray(found["status"], np.uint8)
     path[:, 0] -= rack[:, _PLATE, None]
     path[:, [1, 4]] *= sense
     # the first pose that is not ok determines the status of the turn

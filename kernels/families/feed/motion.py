@@ -24,12 +24,6 @@ from kernels.jit import inline, kernel
 from kernels.linkage.driven_ball import Swung
 from kernels.types import TWO_PI, Array, Status
 
-# Outputs of :func:`poses`, in order: angles, their derivatives, points of the rack, derivatives of the tooth.
-OUTPUTS = (
-    "psi_plus_dh", "dpsi", "d2psi", "chi", "dchi", "d2chi", "x_h", "y_h", "x_e", "y_e", "x_f", "y_f",
-    "x_t", "y_t", "dx_t", "dy_t", "d2x_t", "d2y_t",
-)  # fmt: skip
-
 
 @inline
 def rack_at(r: Reduced, u: Any, v: Any) -> tuple[Swung, Turned, Driven, Driven, int]:
@@ -60,7 +54,7 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, output
     designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     cos_phi, sin_phi : (n, m), or (1, m) shared by all designs
     status : (n, m) out; OK, NOT_ASSEMBLED, DEAD_POINT, SINGULAR or INVALID_INPUT, of the rocker or of the rack
-    outputs : (18, n, m) out in the order of :data:`OUTPUTS` [rad, length]
+    outputs : (18, n, m) out in the order of `POSE_OUTPUTS` of sweep/families/feed.py [rad, length]
 
     Notes
     -----
@@ -124,11 +118,6 @@ _AREA_SETTLED = 1e-10  # relative change by halved panels, below which the error
 _NODES = (0.1834346424956498, 0.5255324099163290, 0.7966664774136267, 0.9602898564975363)
 _WEIGHTS = (0.3626837833783620, 0.3137066458778873, 0.2223810344533745, 0.1012285362903763)
 
-EVENTS = (
-    "phi_entry", "phi_leave", "feed_angle", "entry_speed", "leave_speed", "stitch_length", "rise", "flatness",
-    "crossings", "area_error",
-)  # fmt: skip
-
 
 @inline
 def _height(phi: float, r: Reduced, order: int) -> float:
@@ -184,8 +173,8 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
     ----------
     designs : (n, 23) columns as `PARAMETERS` of sweep/families/feed.py
     status : (n,) out; OK, NO_EVENT (the tooth never passes the plate), or the status of the first pose that is not OK
-    outputs : (10, n) out in the order of :data:`EVENTS` [rad, length, length per rad], ``area_error`` in units of the
-        flatness; nan where the status is not OK
+    outputs : (10, n) out in the order of `FEEDING_OUTPUTS` of sweep/families/feed.py [rad, length, length per rad],
+        then the error of the flatness; nan where the status is not OK
 
     Notes
     -----
@@ -195,7 +184,7 @@ def feeding(designs: Array, status: Status, outputs: Array) -> None:
     step = TWO_PI / SAMPLES
     for i in range(designs.shape[0]):
         r = reduce_design(designs, i)
-        for k in range(len(EVENTS)):
+        for k in range(outputs.shape[0]):
             outputs[k, i] = math.nan
         worst = st.OK if r.valid else st.INVALID_INPUT
         for j in range(SAMPLES):

@@ -30,9 +30,6 @@ _SMALL = 1e-9  # steps of Newton's method from here on are quadratically short, 
 # as small as CLOSE, and the least share of the way that one stage may be.
 _MOST_IN_ALL, _MOST_OF_STAGE, _CLOSE, _LEAST_SHARE = 400, 12, 1e-3, 2.0**-16
 
-OUTPUTS = ("x_t", "y_t", "chi", "dx_t", "dy_t", "dchi", "d2x_t", "d2y_t", "d2chi", "determinant")
-
-
 _LENGTHS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 13, 14, 15, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27)
 
 
@@ -217,7 +214,8 @@ def triad_poses(designs: Array, phi: Array, status: Status, outputs: Array) -> N
     phi : (n, m), or (1, m) shared by all designs [rad]
     status : (n, m) out; OK, NOT_ASSEMBLED or DEAD_POINT (rocker), SINGULAR (the leads lock here or before),
         NOT_CONVERGED (no assembly near the start) or INVALID_INPUT; where it is not OK all outputs are nan
-    outputs : (10, n, m) out in the order of :data:`OUTPUTS` [length, rad]; the determinant in length^4
+    outputs : (10, n, m) out in the order of `TRIAD_OUTPUTS` of sweep/families/feed.py [length, rad], the
+        determinant in length^4
     """
     plain = designs.real
     d, flat = np.empty_like(designs[0]), np.empty(designs.shape[1])

@@ -8,7 +8,7 @@ where the next derivative changes sign.  The march is repeated with half the ste
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from kernels.arithmetic.intrinsics import largest
 from kernels.curves.polynomials import far_minimum, point
@@ -35,6 +35,23 @@ class Loop(NamedTuple):
 
 
 @inline
+def roundings(c: Any, u: Any, v: Any) -> tuple[Any, Any, Any, Any, Any]:
+    """Relative error of Delta, errors of the angle and of the terms of psi', then 1/T and absolute error of Delta.
+
+    ``c`` has the numbers of :class:`Loop`.
+    """
+    x, y, w = closure_terms(c.e, c.y0, c.ca, c.k0, c.k1, c.k2, u, v)
+    # Magnitudes of the terms that X and Y are sums of: rounding is proportional to these, not to the sums.
+    mx, my = abs(c.e) + 1.0, abs(c.y0) + abs(c.ca)
+    tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * c.w_size)
+    # The clamp keeps the quotient finite where rounding made a tiny discriminant negative.
+    per_t = 1.0 / math.sqrt(largest(x * x + y * y - w * w, 1e-300))
+    angle = 4.0 * EPS * (mx + my + c.w_size) * per_t
+    terms = (2.0 * EPS * (2.0 + abs(c.k1) + abs(c.k2)) + angle) * per_t
+    return tolerance * per_t * per_t, angle, terms, per_t, tolerance
+
+
+@inline
 def rounding(order: int, of: Loop, u: float, v: float, height: float) -> tuple[float, float]:
     """Relative rounding errors of the transfer function of that order where it is ``height``, and of its slope.
 
@@ -44,21 +61,13 @@ def rounding(order: int, of: Loop, u: float, v: float, height: float) -> tuple[f
     closure X C - Y S + W divided by T.  Where W is a small difference of large terms, its error hardly changes Delta
     but changes the slope of Delta, and with it the slope of the function [1/rad].
     """
-    e, y0, ca, k0, k1, k2, w_size = of
-    x, y, w = closure_terms(e, y0, ca, k0, k1, k2, u, v)
-    # Magnitudes of the terms that X and Y are sums of: rounding is proportional to these, not to the sums.
-    mx, my = abs(e) + 1.0, abs(y0) + abs(ca)
-    tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * w_size)
-    slope = 4.0 * EPS * (abs(v) * mx + abs(ca * u) * my + abs(k1 * u + k2 * v) * w_size)
-    delta = x * x + y * y - w * w
-    # The clamp keeps the quotient finite where rounding made a tiny discriminant negative.
-    per_t = 1.0 / math.sqrt(largest(delta, 1e-300))
-    angle = 4.0 * EPS * (mx + my + w_size) * per_t
-    terms = (2.0 * EPS * (2.0 + abs(k1) + abs(k2)) + angle) * per_t
+    share, _, terms, per_t, _ = roundings(of, u, v)
+    mx, my = abs(of.e) + 1.0, abs(of.y0) + abs(of.ca)
+    slope = abs(v) * mx + abs(of.ca * u) * my + abs(of.k1 * u + of.k2 * v) * of.w_size
     more = 1.0 + per_t
     terms *= 1.0 if order == 1 else (more if order == 2 else more * more)
-    per_delta = (order + 0.5) * (per_t * per_t)
-    return tolerance * per_delta + 8.0 * EPS + terms / abs(height), slope * per_delta
+    orders = order + 0.5
+    return orders * share + 8.0 * EPS + terms / abs(height), 4.0 * EPS * slope * (orders * (per_t * per_t))
 
 
 @inline

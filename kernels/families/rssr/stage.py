@@ -19,7 +19,8 @@ from kernels.families.rssr.block import (
     new_block,
     singularity_distance,
 )
-from kernels.families.rssr.closure import acceleration, closure_terms, jerk, place, reduce_one, rocker, snap, velocity
+from kernels.families.rssr.careful import roundings
+from kernels.families.rssr.closure import acceleration, jerk, place, reduce_one, rocker, snap, velocity
 from kernels.jit import inline, kernel
 from kernels.linkage.verdict import turning_status
 from kernels.types import EPS, Array, Status
@@ -89,7 +90,7 @@ def _dip(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any]:
 @inline
 def _turn_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple[Any, Any, Any, Any]:
     """Estimate rounding errors of the angle and its derivatives as :func:`kernels.families.rssr.careful.rounding`."""
-    share, angle, terms, per_t, _ = _roundings(c, u, v)
+    share, angle, terms, per_t, _ = roundings(c, u, v)
     more = 1.0 + per_t
     first = abs(d1) * (1.5 * share + 8.0 * EPS) + terms
     second = abs(d2) * (2.5 * share + 8.0 * EPS) + terms * more
@@ -98,21 +99,9 @@ def _turn_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple
 
 
 @inline
-def _roundings(c: Constants, u: Any, v: Any) -> tuple[Any, Any, Any, Any, Any]:
-    """Relative error of Delta, errors of the angle and of the terms of psi', then 1/T and absolute error of Delta."""
-    x, y, w = closure_terms(c.e, c.y0, c.ca, c.k0, c.k1, c.k2, u, v)
-    mx, my = abs(c.e) + 1.0, abs(c.y0) + abs(c.ca)
-    tolerance = 4.0 * EPS * (abs(x) * mx + abs(y) * my + abs(w) * c.w_size)
-    per_t = 1.0 / math.sqrt(largest(x * x + y * y - w * w, 1e-300))
-    angle = 4.0 * EPS * (mx + my + c.w_size) * per_t
-    terms = (2.0 * EPS * (2.0 + abs(c.k1) + abs(c.k2)) + angle) * per_t
-    return tolerance * per_t * per_t, angle, terms, per_t, tolerance
-
-
-@inline
 def _travel_blur(c: Constants, u: Any, v: Any, d1: Any, d2: Any, d3: Any) -> tuple[Any, ...]:
     angle, first, second, third = _turn_blur(c, u, v, d1, d2, d3)
-    _, _, _, _, tolerance = _roundings(c, u, v)
+    _, _, _, _, tolerance = roundings(c, u, v)
     return angle, first, second, third, 0.0, 0.0, 0.0, 0.0, tolerance * c.per_square
 
 

@@ -15,15 +15,16 @@ from mpmath import mp, mpf
 import sweep
 from kernels import status as st
 from kernels.families import feed
-from kernels.families.feed.motion import EVENTS, OUTPUTS
 from sweep.families import family
 from sweep.families.base import Angles
+from sweep.families.feed import FEEDING_OUTPUTS, POSE_OUTPUTS
 from tests.reference import feed as naive
 from tests.support.family_checks import factors
 
 ROWS = [r for r in json.loads((Path(__file__).parents[2] / "oracle" / "feed_open.json").read_text())["rows"]
         if r["kind"] == "rack"]  # fmt: skip
 FIELDS = family("feed").parameter_names
+OUTPUTS = [o.name for o in POSE_OUTPUTS]
 RACK = {
     "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "h_f": 0.0, "h_g": 0.0, "h_alpha": 0.0, "rh": 1.2, "dh": -0.3,
     "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8, "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "tooth": 0.0,
@@ -56,7 +57,7 @@ def conditions(p, phi):
 def test_feed_matches_oracle_on_every_rack_row():
     for row in ROWS:
         p, expected = row["inputs"], row["expected"]
-        got = sweep.evaluate("feed", p, list(OUTPUTS)).iloc[0]
+        got = sweep.evaluate("feed", p, OUTPUTS).iloc[0]
         assert got.status == st.OK
         with mp.workdps(40):
             sizes = conditions(p, p["phi"])
@@ -100,7 +101,7 @@ def test_feed_weighted_difference_matches_oracle():
 )  # fmt: skip
 def test_feed_equals_points_and_circles_with_a_spatial_chain_too(changes, phi):
     p = RACK | changes
-    got = sweep.evaluate("feed", p | {"phi": phi}, list(OUTPUTS)).iloc[0]
+    got = sweep.evaluate("feed", p | {"phi": phi}, OUTPUTS).iloc[0]
     assume(got.status == st.OK)
     with mp.workdps(40):
         values = exact(p)
@@ -246,7 +247,7 @@ def test_feed_jitted_equals_plain():
     heights[:, FIELDS.index("y_plate")] = run(feed.poses, np.float64)[1][13, :, 0]
     results = []
     for function in (feed.feeding, feed.feeding.py_func):
-        status, out = np.empty(3, np.uint8), np.empty((len(EVENTS), 3))
+        status, out = np.empty(3, np.uint8), np.empty((len(FEEDING_OUTPUTS) + 1, 3))
         function(heights, status, out)
         results.append((status, out))
     np.testing.assert_array_equal(results[0][0], results[1][0])
