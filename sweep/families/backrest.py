@@ -14,10 +14,10 @@ import numpy as np
 
 from kernels.families import backrest
 from kernels.types import Array, Status
-from sweep.families.base import Angles, Columns, Family, Interval, Output, Parameter, floats
+from sweep.families.base import Angles, Family, Interval, Output, Parameter
 from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton
 from sweep.families.poses import following, guarded, poses_of
-from sweep.families.skeletons import ORIGIN, parameter, standing
+from sweep.families.skeletons import ORIGIN, moving, parameter, standing
 
 FRAME = (
     Parameter("a1", "length", "warp stop motion, where the warp ends, to the right of the beam axis"),
@@ -163,22 +163,12 @@ LINKS = (
 def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
     """Make the skeleton in the plane of the beam; ``angle`` is the entry's output of the bracket angle."""
 
-    def column(name: str, designs: Array) -> Array:
-        return parameter(parameters, name, designs)[:, None]
-
     def guide(designs: Array) -> Array:
         psi = parameter(parameters, "psi", designs)
         return np.stack([-np.cos(psi), np.sin(psi), 0.0 * psi], axis=1)
 
-    def made(needs: tuple[str, ...], at: Callable[..., tuple[Array, Array]]) -> MovingPoint:
-        """Make a point of the plane: ``at(column, designs, rho, *needs)`` returns its x and y, each (n, m)."""
-
-        def place(designs: Array, angles: Angles, found: Columns) -> Array:
-            values = floats(found, *needs)
-            x, y = at(lambda name: column(name, designs), angles.phi, *values)
-            return np.stack([x, y, 0.0 * x], axis=-1)
-
-        return MovingPoint(needs, place)
+    def made(sizes: str, needs: tuple[str, ...], place: Callable[..., tuple[Array, Array]]) -> MovingPoint:
+        return moving(parameters, sizes, needs, place)
 
     axis = ("x_axis", "y_axis")
     return Skeleton(
@@ -191,48 +181,44 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
         },
         LINKS,
         {
-            "s": made((angle, "R1"), _slider),
-            "m": made((angle,), _spring),
-            "p": made(("h",), _pin),
-            "t1": made(("theta",), _on_beam),
-            "t2": made((*axis, "theta"), _from_beam),
-            "t3": made((*axis, "gamma"), _to_fell),
+            "s": made("a2 b2", (angle, "R1"), _slider),
+            "m": made("a2 b2 lM nu", (angle,), _spring),
+            "p": made("xE yE psi", ("h",), _pin),
+            "t1": made("", ("theta",), _on_beam),
+            "t2": made("r", (*axis, "theta"), _from_beam),
+            "t3": made("r", (*axis, "gamma"), _to_fell),
         },
     )
 
 
-Columned = Callable[[str], Array]
-
-
-def _slider(of: Columned, rho: Array, phi: Array, reach: Array) -> tuple[Array, Array]:
+def _slider(angles: Angles, a2: Array, b2: Array, phi: Array, reach: Array) -> tuple[Array, Array]:
     """Foot of the slider on the line of the bracket; (1)."""
-    return of("a2") - reach * np.cos(phi), of("b2") + reach * np.sin(phi)
+    return a2 - reach * np.cos(phi), b2 + reach * np.sin(phi)
 
 
-def _spring(of: Columned, rho: Array, phi: Array) -> tuple[Array, Array]:
+def _spring(angles: Angles, a2: Array, b2: Array, arm: Array, nu: Array, phi: Array) -> tuple[Array, Array]:
     """End of the spring on the bracket; (6)."""
-    turn = phi + of("nu")
-    return of("a2") - of("lM") * np.cos(turn), of("b2") + of("lM") * np.sin(turn)
+    return a2 - arm * np.cos(phi + nu), b2 + arm * np.sin(phi + nu)
 
 
-def _pin(of: Columned, rho: Array, h: Array) -> tuple[Array, Array]:
+def _pin(angles: Angles, x: Array, y: Array, psi: Array, h: Array) -> tuple[Array, Array]:
     """Point where the pin touches the guide; (2)."""
-    return of("xE") - h * np.cos(of("psi")), of("yE") + h * np.sin(of("psi"))
+    return x - h * np.cos(psi), y + h * np.sin(psi)
 
 
-def _on_beam(of: Columned, rho: Array, theta: Array) -> tuple[Array, Array]:
+def _on_beam(angles: Angles, theta: Array) -> tuple[Array, Array]:
     """Point where the yarn leaves the beam, on the side away from the fell; (3)."""
-    return -rho * np.cos(theta), rho * np.sin(theta)
+    return -angles.phi * np.cos(theta), angles.phi * np.sin(theta)
 
 
-def _from_beam(of: Columned, rho: Array, x: Array, y: Array, theta: Array) -> tuple[Array, Array]:
+def _from_beam(angles: Angles, r: Array, x: Array, y: Array, theta: Array) -> tuple[Array, Array]:
     """Point where the yarn meets the back-rest; (3)."""
-    return x - of("r") * np.cos(theta), y + of("r") * np.sin(theta)
+    return x - r * np.cos(theta), y + r * np.sin(theta)
 
 
-def _to_fell(of: Columned, rho: Array, x: Array, y: Array, gamma: Array) -> tuple[Array, Array]:
+def _to_fell(angles: Angles, r: Array, x: Array, y: Array, gamma: Array) -> tuple[Array, Array]:
     """Point where the yarn leaves the back-rest; (4)."""
-    return x + of("r") * np.sin(gamma), y + of("r") * np.cos(gamma)
+    return x + r * np.sin(gamma), y + r * np.cos(gamma)
 
 
 def _entry(

@@ -6,13 +6,13 @@ import numpy as np
 
 from kernels.families import cam
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
-from sweep.families.capabilities import Dimensions, Link, MovingPoint, OutputLink, Skeleton
+from sweep.families.base import Angles, Family, Output, Parameter
+from sweep.families.capabilities import Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, kinked, ladders
 from sweep.families.planar_trees import sliding_follower, swinging_follower
 from sweep.families.poses import following, poses_of
-from sweep.families.skeletons import ORIGIN, X, dimensions, line, links, parameter, standing
+from sweep.families.skeletons import ORIGIN, X, dimensions, line, links, moving, parameter, standing
 
 PHASES = (
     Parameter("rise", "angle", "cam angle of the rise", positive=True, default=0.5 * np.pi),
@@ -125,11 +125,9 @@ LEVER_OUTPUTS = (
 lever_poses = poses_of(cam.lever_poses, cam.LeverOutputs, angles="phi")
 
 
-def roller(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Return the roller's centre in the fixed frame, (n, m, 3)."""
-    psi = np.asarray(motion["psi"], np.float64)
-    e, c = dimensions(LEVER_PARAMETERS, designs, "e", "c")
-    return np.stack([e + c * np.cos(psi), c * np.sin(psi), np.zeros_like(psi)], axis=-1)
+def roller(angles: Angles, e: Array, c: Array, psi: Array) -> tuple[Array, Array]:
+    """Roller's centre in the fixed frame."""
+    return e + c * np.cos(psi), c * np.sin(psi)
 
 
 LEVER = Family(
@@ -150,7 +148,7 @@ LEVER = Family(
         Skeleton(
             {"a": ORIGIN, "d": standing(LEVER_PARAMETERS, "e")},
             (Link("cam", ("a",)), Link("lever", ("d", "r"))),
-            {"r": MovingPoint(("psi",), roller)},
+            {"r": moving(LEVER_PARAMETERS, "e c", ("psi",), roller)},
         ),
     ),
 )

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ if TYPE_CHECKING:  # families without fused kernels do not wait for the import
     from kernels.chains.form import Form
 
 DesignMap: TypeAlias = Callable[[Array], Array]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,17 @@ class Assembly:
     scale: DesignMap
     stage: str = ""
     end: tuple[str, DesignMap] | None = None
+
+    def of_part(self, named: Callable[[str], str], part: DesignMap) -> Assembly:
+        """Return the loop as one of a chain or a machine: with the names there, and the designs of the part."""
+        end = self.end and (named(self.end[0]), partial(on_part, part, self.end[1]))
+        scale = partial(on_part, part, self.scale)
+        return Assembly(named(self.discriminant), named(self.pressure_angle), scale, named(self.stage), end)
+
+
+def on_part(part: DesignMap, of_design: Callable[[Array], T], designs: Array) -> T:
+    """Evaluate a function of a stage's or member's designs on designs of the whole."""
+    return of_design(part(designs))
 
 
 def constant(*numbers: float) -> DesignMap:

@@ -14,8 +14,8 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, Stage, Step, Turn
-from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink
-from sweep.families.curve_features import of_stages, on_part
+from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, on_part
+from sweep.families.curve_features import of_stages
 from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.names import ends_in_digit
 from sweep.families.poses import blocks
@@ -135,7 +135,7 @@ def chain(families: tuple[Family, ...]) -> Chain:
         analytic=all(f.analytic for f in families),
         points={name: at for name, at in last.points.items() if not ends_in_digit(name)},
         capabilities=(
-            *(loop for stage in stages for loop in _loops(stage)),
+            *(_loop(stage, loop) for stage in stages for loop in stage.family.every(Assembly)),
             *(OutputLink(partial(on_part, stages[-1].designs, link.origin)) for link in last.every(OutputLink)),
             *of_stages(stages),
         ),
@@ -153,18 +153,8 @@ def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
     return tuple(replace(stage, family=stage.family.precise()) for stage in stages)
 
 
-def _loops(stage: Stage) -> list[Assembly]:
-    """Rename the loops of a stage for the chain."""
-    return [
-        Assembly(
-            f"{loop.discriminant}{stage.number}",
-            f"{loop.pressure_angle}{stage.number}",
-            partial(on_part, stage.designs, loop.scale),
-            f"{loop.stage}{stage.number}",
-            loop.end and (f"{loop.end[0]}{stage.number}", partial(on_part, stage.designs, loop.end[1])),
-        )
-        for loop in stage.family.every(Assembly)
-    ]
+def _loop(stage: Stage, loop: Assembly) -> Assembly:
+    return loop.of_part(lambda name: f"{name}{stage.number}", stage.designs)
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

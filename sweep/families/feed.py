@@ -18,7 +18,7 @@ from sweep.families.base import PER_RADIAN, Accuracy, Angles, Columns, Family, O
 from sweep.families.capabilities import Arm, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
-from sweep.families.outputs import joint_outputs, ladders
+from sweep.families.outputs import joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import chosen, filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
@@ -72,13 +72,6 @@ def _place_of_tooth(equation: str) -> tuple[Output, ...]:
     return joint_outputs({"t": "tooth"}, equation, _WAYS)
 
 
-def _rates_of_tooth(order: str, kind: str, equation: str) -> tuple[Output, ...]:
-    return tuple(
-        Output(f"{order}{axis}_t", "length", f"{kind} analogue of the tooth {way}", equation)
-        for axis, way in zip("xy", _WAYS, strict=True)
-    )
-
-
 POSE_OUTPUTS = (
     Output("psi_plus_dh", "rad", "direction of the arm to H", "(3)", wraps=True),
     Output("dpsi", "1", "its first derivative by phi", "(3)"),
@@ -90,8 +83,7 @@ POSE_OUTPUTS = (
     *joint_outputs({"e": "centre E of the lift eccentric"}, "(5)", ("along x", "along y")),
     *joint_outputs({"f": "joint F of the lift coupler"}, "(9)", ("along x", "along y")),
     *_place_of_tooth("(9)"),
-    *_rates_of_tooth("d", "velocity", "(9)"),
-    *_rates_of_tooth("d2", "acceleration", "(9)"),
+    *joint_rate_outputs("t", "tooth", "(9)", _WAYS),
 )
 
 FEEDING_OUTPUTS = (
@@ -235,9 +227,9 @@ TRIAD_PARAMETERS = (
 TRIAD_OUTPUTS = (
     *_place_of_tooth("(15)"),
     Output("chi", "rad", "angle of the rack", "(15)", wraps=True),
-    *_rates_of_tooth("d", "velocity", "(16)"),
+    *joint_rate_outputs("t", "tooth", "(16)", _WAYS, (1,)),
     Output("dchi", "1", "first derivative of chi by phi", "(16)"),
-    *_rates_of_tooth("d2", "acceleration", "(17)"),
+    *joint_rate_outputs("t", "tooth", "(17)", _WAYS, (2,)),
     Output("d2chi", "1", "second derivative of chi", "(17)"),
     Output("determinant", "length^4", "of the closures: zero where the three leads lock", "(16)"),
 )

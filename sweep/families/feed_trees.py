@@ -39,24 +39,21 @@ def _horizontal(parameters: Parameters, designs: Array, angles: Angles, links: L
     psi = poses.turning(CRANK_ROCKER.poses(chain, angles, frozenset(_SPIN)), *_SPIN)
     centre = poses.standing_at(links, 0.0, f * np.sin(alpha), f * np.cos(alpha))
     crank = poses.crank_arm(links, angles, alpha, a)
-    poses.put_crank(links, CRANK, 0, centre, crank)
+    poses.put_crank(links, CRANK, centre, crank)
     pivot = poses.standing_at(links, e, 0.0, g)
     ball = pivot.plus(psi.arm(c))
     poses.put_between(links, COUPLER, centre.plus(crank), ball)
-    links.axes[:, :, 1:3] = links.bodies[:, :, COUPLER, 18:24].reshape(*links.bodies.shape[:2], 2, 3)
     poses.put_about(links, ROCKER, pivot, psi)
-    poses.turn_about_z(links, 3)
     poses.put_ball(links, 0, ball.at)
     return poses.standing_at(links, e).plus(psi.arm(arm * np.cos(ahead), arm * np.sin(ahead)))
 
 
 def _eccentric(parameters: Parameters, designs: Array, angles: Angles, links: Links, body: int, which: str) -> Path:
-    """Write an eccentric, whose freedom has the body's number plus 1; return the path of its centre."""
+    """Write an eccentric; return the path of its centre."""
     x, y, radius, ahead = dimensions(parameters, designs, *(f"{name}{which}" for name in ("xE", "yE", "rE", "dE")))
     turned = poses.crank_angle(links, angles, ahead=ahead)
     centre = poses.standing_at(links, x, y)
     poses.put_about(links, body, centre, turned)
-    poses.turn_about_z(links, body + 1)
     return centre.plus(turned.arm(radius))
 
 
@@ -81,7 +78,6 @@ def two_leads(parameters: Parameters) -> LinkTree:
         f = h.plus(chi.arm(*dimensions(parameters, designs, "fx", "fy")))
         poses.put_between(links, 4, e, f)
         poses.put_about(links, 5, h, chi)
-        poses.turn_about_z(links, 5, 6)
         poses.put_pin(links, 3, f.at)
 
     body, joint = _eccentric_parts("", ECCENTRIC)
@@ -131,7 +127,6 @@ def three_leads(parameters: Parameters) -> LinkTree:
         # the rack hangs on link 1, its tooth is the origin of its axes
         poses.put_about(links, rack, tooth, chi)
         links.bodies[:, :, rack, 24:] = ends[0].at
-        poses.turn_about_z(links, *range(links_from + 1, rack + 2))
         for k in (1, 2):
             poses.put_pin(links, 3 + 2 * (k - 1), ends[k].at)
 

@@ -17,7 +17,7 @@ from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output
 from sweep.families.capabilities import Fixed, Link, MovingPoint, PresserFoot, Skeleton
 from sweep.families.poses import chosen, equal_steps, guarded
 from sweep.families.skeletons import Y as UPWARDS
-from sweep.families.skeletons import parameter, standing
+from sweep.families.skeletons import moving, standing
 
 FOOT = (
     Parameter("m", "mass", "foot with its bar", positive=True),
@@ -169,16 +169,14 @@ def _events(
     return happening(run(designs, NODES)[0], wanted)
 
 
-def foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute the point of the foot, above the middle of the rack's travel."""
-    y = np.asarray(found["y_foot"], np.float64)
-    return np.stack([0.0 * y, y, 0.0 * y], axis=-1)
+def foot_place(angles: Angles, y: Array) -> tuple[Array, Array]:
+    """Point of the foot, above the middle of the rack's travel."""
+    return 0.0 * y, y
 
 
-def rack_place(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute the point of the rack's tooth."""
-    y = np.asarray(found["y_rack"], np.float64)
-    return np.stack([-parameter(PARAMETERS, "X", designs)[:, None] * np.cos(angles.phi) + 0.0 * y, y, 0.0 * y], axis=-1)
+def rack_place(angles: Angles, half: Array, y: Array) -> tuple[Array, Array]:
+    """Point of the rack's tooth."""
+    return -half * np.cos(angles.phi), y
 
 
 EXAMPLE = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
@@ -203,7 +201,10 @@ FAMILY = Family(
         Skeleton(
             {"d": standing(PARAMETERS, axis=UPWARDS, kind="slide")},
             (Link("foot", ("p",)), Link("rack", ("t",))),
-            {"p": MovingPoint(("y_foot",), foot_place), "t": MovingPoint(("y_rack",), rack_place)},
+            {
+                "p": moving(PARAMETERS, "", ("y_foot",), foot_place),
+                "t": moving(PARAMETERS, "X", ("y_rack",), rack_place),
+            },
         ),
     ),
 )

@@ -17,7 +17,7 @@ from sweep.families import guide
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Columns, Family, Output, PoseFunction
 from sweep.families.hardpoints import FOUR_BAR_POINTS
-from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
+from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import following, on_matrix, step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
@@ -37,10 +37,7 @@ ROCKER_OUTPUTS = (
 
 POINT_OUTPUTS = (
     *joint_outputs({"m": "coupler point"}, "(2)", ALONG_FRAME),
-    Output("dx_m", "length", "first derivative of x_m with respect to phi", "(2)"),
-    Output("dy_m", "length", "first derivative of y_m", "(2)"),
-    Output("d2x_m", "length", "second derivative of x_m", "(2)"),
-    Output("d2y_m", "length", "second derivative of y_m", "(2)"),
+    *joint_rate_outputs("m", "coupler point", "(2)", ALONG_FRAME),
 )
 
 # The guide's names of the coupler point's motion, for a line along the frame through the crank pivot.

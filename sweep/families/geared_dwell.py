@@ -11,12 +11,12 @@ from kernels import status as st
 from kernels.families import epicyclic_dwell, geared_dwell
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Link, MovingPoint, OutputLink, Skeleton, constant
+from sweep.families.capabilities import Link, OutputLink, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import coordinate_outputs, ladders
 from sweep.families.planar_trees import rolling_planet
 from sweep.families.poses import chosen, filled_each, poses_of
-from sweep.families.skeletons import ORIGIN, dimensions, parameter, standing
+from sweep.families.skeletons import ORIGIN, moving, parameter, standing
 
 PARAMETERS = (
     Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
@@ -134,16 +134,13 @@ def skeleton(parameters: tuple[Parameter, ...]) -> Skeleton:
     """Make the skeleton of carrier, planet and slotted link, in planet radii; without a ratio both gears are equal."""
     whole = "n" in [p.name for p in parameters]
 
-    def centre(designs: Array, angles: Angles, motion: Columns) -> Array:
-        (a,) = dimensions(parameters, designs, "a")
-        n, mesh = dimensions(parameters, designs, "n", "mesh") if whole else (np.ones_like(a), np.ones_like(a))
-        x = a + (n + mesh) * angles.cos
-        return np.stack([x, (n + mesh) * angles.sin, np.zeros_like(x)], axis=-1)
+    def centre(angles: Angles, a: Array, n: Array | float = 1.0, mesh: Array | float = 1.0) -> tuple[Array, Array]:
+        return a + (n + mesh) * angles.cos, (n + mesh) * angles.sin
 
     return Skeleton(
         {"a": standing(parameters, "a"), "d": ORIGIN},
         (Link("carrier", ("a", "o")), Link("planet", ("o", "b")), Link("slotted link", ("d", "b"))),
-        {"o": MovingPoint((), centre)},
+        {"o": moving(parameters, "a n mesh" if whole else "a", (), centre)},
     )
 
 

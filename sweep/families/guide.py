@@ -15,7 +15,7 @@ from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.hardpoints import GUIDE_POINTS
-from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders
+from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import following, poses_of, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
@@ -42,11 +42,7 @@ VALUE_OUTPUTS = (
 
 JOINT_OUTPUTS = joint_outputs({"b": "crank pin", "c": "rocker pin", "m": "coupler point"}, "(6)", ALONG_FRAME)
 
-POINT_OUTPUTS = tuple(
-    Output(f"{order}{axis}_m", "length", f"{kind} analogue of the coupler point {way}", "(6)")
-    for order, kind in (("d", "velocity"), ("d2", "acceleration"))
-    for axis, way in zip("xy", ALONG_FRAME, strict=True)
-)
+POINT_OUTPUTS = joint_rate_outputs("m", "coupler point", "(6)", ALONG_FRAME)
 
 _LAM = [p.name for p in PARAMETERS].index("lam")
 

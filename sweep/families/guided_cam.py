@@ -7,11 +7,11 @@ import numpy as np
 from kernels.families import guided_cam
 from kernels.types import EPS, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
-from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton, ThreadPath
+from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
 from sweep.families.poses import following, poses_of
-from sweep.families.skeletons import Y, line, parameter, standing
+from sweep.families.skeletons import Y, line, moving, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
 PARAMETERS = (
@@ -94,10 +94,9 @@ def follower_line(designs: Array) -> tuple[Array, Array]:
     return np.stack([e, 0.0 * e, 0.0 * e], axis=1), np.tile(np.array(Y), (len(designs), 1))
 
 
-def follower(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute the end of the follower, which lies on the cam and carries the thread, (n, m, 3)."""
-    s = np.asarray(found["S"], np.float64)
-    return np.stack([np.broadcast_to(parameter(PARAMETERS, "e", designs)[:, None], s.shape), s, 0.0 * s], axis=-1)
+def follower(angles: Angles, e: Array, s: Array) -> tuple[Array, Array]:
+    """End of the follower, which lies on the cam and carries the thread."""
+    return e, s
 
 
 def guide(side: float) -> Fixed:
@@ -138,7 +137,7 @@ FAMILY = Family(
                 Link("thread 1", ("n1", "r")),
                 Link("thread 2", ("r", "n2")),
             ),
-            {"r": MovingPoint(("S",), follower)},
+            {"r": moving(PARAMETERS, "e", ("S",), follower)},
         ),
     ),
 )

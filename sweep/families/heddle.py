@@ -8,10 +8,10 @@ from kernels.families import heddle
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, MovingPoint, Skeleton
-from sweep.families.outputs import joint_outputs, ladders
+from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.planar_trees import heddle_shaft
 from sweep.families.poses import poses_of
-from sweep.families.skeletons import ORIGIN, Y, Z, line, links, parameter, squared, standing
+from sweep.families.skeletons import ORIGIN, Y, Z, line, links, moving, parameter, squared, standing
 
 PARAMETERS = (
     Parameter("O2B", "length", "arm of the cam lever", positive=True),
@@ -34,14 +34,14 @@ PARAMETERS = (
 )  # fmt: skip
 
 VALUE_OUTPUTS = (
-    Output("chi", "rad", "bell-crank angle, direction of O3C from the line O2O3", "(4)", wraps=True),
-    Output("dchi", "1", "dchi/dtheta", "(5)"),
-    Output("d2chi", "1", "second derivative of chi", "(5)"),
-    Output("d3chi", "1", "third derivative of chi", "(5)"),
-    Output("y", "length", "lift of the shaft, zero at mid-stroke (with a heddle rod: height of its lower end)", "(7)"),
-    Output("dy", "length", "velocity analogue dy/dtheta", "(9)"),
-    Output("d2y", "length", "acceleration analogue", "(9)"),
-    Output("d3y", "length", "jerk analogue", "(9)"),
+    *coordinate_outputs("chi", "rad", "bell-crank angle, direction of O3C from the line O2O3", "(4)", "(5)"),
+    *coordinate_outputs(
+        "y",
+        "length",
+        "lift of the shaft from mid-stroke; with a heddle rod the height of its lower end",
+        "(7)",
+        "(9)",
+    ),
     Output("discriminant", "length^2", "Delta; the rod reaches where it is not negative", "(3)"),
 )
 
@@ -73,29 +73,22 @@ def shaft_line(designs: Array) -> tuple[Array, Array]:
     return at, np.tile(np.array(Y), (len(designs), 1))
 
 
-def _arm(pivot: Array, length: Array, angle: Array) -> Array:
-    """Compute the end of an arm at an angle from x, (n, m, 3)."""
-    end: Array = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=-1) * length[:, None, None]
-    return pivot[:, None, :] + end
+def lower_arm(angles: Angles, x: Array, middle: Array, length: Array, side: Array, chi: Array) -> tuple[Array, Array]:
+    """D: the lower arm of the bell crank, perpendicular to O3O4 at mid-stroke."""
+    turn = chi - middle
+    return x - length * side * np.sin(turn), length * side * np.cos(turn)
 
 
-def lower_arm(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute D: the lower arm of the bell crank, perpendicular to O3O4 at mid-stroke."""
-    x = _column("O2O3", designs)
-    turn = np.asarray(found["chi"], np.float64) - _column("chi_mid", designs)[:, None]
-    pivot = np.stack([x, 0.0 * x, 0.0 * x], axis=1)
-    return _arm(pivot, _column("O3D", designs) * _column("side_F", designs), turn + 0.5 * np.pi)
+def shaft_lever(angles: Angles, x: Array, frame: Array, length: Array, lam: Array) -> tuple[Array, Array]:
+    """E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
+    return x + frame + length * np.cos(lam), length * np.sin(lam)
 
 
-def shaft_lever(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute E: the arm of the shaft lever to the heddle rod, horizontal at mid-stroke."""
-    return _arm(shaft_pivot(designs), _column("O4E", designs), np.asarray(found["lam"], np.float64))
-
-
-def shaft_lever_back(designs: Array, angles: Angles, found: Columns) -> Array:
-    """Compute F: the arm of the shaft lever to the link, perpendicular to the other arm."""
-    length = _column("O4F", designs) * _column("side_F", designs)
-    return _arm(shaft_pivot(designs), length, np.asarray(found["lam"], np.float64) + 0.5 * np.pi)
+def shaft_lever_back(
+    angles: Angles, x: Array, frame: Array, length: Array, side: Array, lam: Array
+) -> tuple[Array, Array]:
+    """F: the arm of the shaft lever to the link, perpendicular to the other arm."""
+    return x + frame - length * side * np.sin(lam), length * side * np.cos(lam)
 
 
 def shaft(designs: Array, angles: Angles, found: Columns) -> Array:
@@ -132,8 +125,10 @@ FAMILY = Family(
                 Link("shaft", ("g",)),
             ),
             {
-                "d": MovingPoint(("chi",), lower_arm), "e": MovingPoint(("lam",), shaft_lever),
-                "f": MovingPoint(("lam",), shaft_lever_back), "g": MovingPoint(("y",), shaft),
+                "d": moving(PARAMETERS, "O2O3 chi_mid O3D side_F", ("chi",), lower_arm),
+                "e": moving(PARAMETERS, "O2O3 O3O4 O4E", ("lam",), shaft_lever),
+                "f": moving(PARAMETERS, "O2O3 O3O4 O4F side_F", ("lam",), shaft_lever_back),
+                "g": MovingPoint(("y",), shaft),
             },
         ),
     ),

@@ -187,31 +187,42 @@ def crank_arm(links: Links, angles: Angles, alpha: Array, length: Array) -> Path
     return Path(*(np.broadcast_to(part, (*links.bodies.shape[:2], 3)) for part in path))
 
 
-def put_about(links: Links, body: int, at: Path, turned: Turning) -> None:
-    """Write a body that turns about z, with the first axis at the angle; its joint is its origin."""
+def _freedoms(links: Links, body: int) -> list[int]:
+    """Numbers of the freedoms of a body."""
+    return np.flatnonzero((links.freedoms[:, :, 0] == body).any(axis=0)).tolist()
+
+
+def put_about(links: Links, body: int, at: Path, turned: Turning, way: Array = _Z) -> None:
+    """Write a body that turns about z, with the first axis at the angle; its joint is its origin.
+
+    It turns freely on its parent, or slides along ``way`` on one that turns like it.
+    """
     x = turned.arm(np.ones((1, 1))).at
+    links.axes[:, :, _freedoms(links, body)] = way[..., None, :]
     _put(links, body, at, x, product(_Z, x), turned.rate[..., None] * _Z, turned.bend[..., None] * _Z)
 
 
-def put_shifted(links: Links, body: int, at: Path) -> None:
-    """Write a body that does not turn; its axes are those of the frame."""
+def put_shifted(links: Links, body: int, at: Path, way: tuple[float, float, float]) -> None:
+    """Write a body that slides along ``way`` and does not turn; its axes are those of the frame."""
     none = np.zeros(3)
+    links.axes[:, :, _freedoms(links, body)] = way
     _put(links, body, at, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), none, none)
 
 
-def put_crank(links: Links, body: int, freedom: int, at: Path, arm: Path) -> None:
+def put_crank(links: Links, body: int, at: Path, arm: Path) -> None:
     """Write a crank with its first axis along its arm, and the axis that drives it."""
     x = arm.at / np.linalg.norm(arm.at, axis=-1, keepdims=True)
     y = arm.v / np.linalg.norm(arm.v, axis=-1, keepdims=True)
     u = product(x, y)
     _put(links, body, at, x, y, u, np.zeros(3))
-    links.axes[:, :, freedom] = u
+    links.axes[:, :, _freedoms(links, body)] = u[..., None, :]
 
 
 def put_between(links: Links, body: int, start: Path, end: Path) -> None:
     """Write a body between two points of constant distance, with the first axis along it and no spin about that axis.
 
-    If the points are in the plane z = 0, so is the second axis.
+    If the points are in the plane z = 0, so is the second axis.  A body of one freedom turns about z, one of two about
+    its second and third axis.
     """
     along = end.minus(start)
     square = (along.at * along.at).sum(axis=-1, keepdims=True)
@@ -219,6 +230,9 @@ def put_between(links: Links, body: int, start: Path, end: Path) -> None:
     least = np.eye(3)[np.where(np.abs(x[..., 2]) < 0.5, 2, 0)]
     y = product(least, x)
     y /= np.linalg.norm(y, axis=-1, keepdims=True)
+    own = _freedoms(links, body)
+    for freedom, way in zip(own, (_Z,) if len(own) == 1 else (y, product(x, y)), strict=False):
+        links.axes[:, :, freedom] = way
     _put(links, body, start, x, y, product(along.at, along.v) / square, product(along.at, along.a) / square)
 
 
@@ -244,9 +258,3 @@ def put_line(links: Links, line: int, at: Array, way: Array) -> None:
     """Write a line of force through a point; ``way`` need not be a unit vector."""
     links.lines[:, :, line, :3] = at
     links.lines[:, :, line, 3:] = way / np.linalg.norm(way, axis=-1, keepdims=True)
-
-
-def turn_about_z(links: Links, *freedoms: int) -> None:
-    """Set the axes of the given freedoms to z."""
-    for freedom in freedoms:
-        links.axes[:, :, freedom] = _Z

@@ -70,6 +70,17 @@ def joint_outputs(
     )
 
 
+def joint_rate_outputs(
+    name: str, text: str, equation: str, ways: Sequence[str], orders: Sequence[int] = (1, 2)
+) -> tuple[Output, ...]:
+    """Return derivatives of a joint's coordinates along two or three directions, of the given orders."""
+    return tuple(
+        Output(f"{_ORDERS[order]}{axis}_{name}", "length", f"{_KINDS[order]}{text}, {way}", equation)
+        for order in orders
+        for axis, way in zip(AXES, ways, strict=False)
+    )
+
+
 def kinked(outputs: Iterable[Output]) -> tuple[Output, ...]:
     """Mark outputs whose curves have kinks or jumps; angles and whole numbers are left unmarked."""
     return tuple(replace(o, kinks=not (o.wraps or o.jumps)) for o in outputs)

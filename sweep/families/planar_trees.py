@@ -40,7 +40,6 @@ def _bearing(text: str) -> LinkJoint:
 def _put_cam(angles: Angles, links: Links, at: Path) -> None:
     """Write the pose of a cam on the driven shaft, at the crank angle."""
     poses.put_about(links, 0, at, poses.crank_angle(links, angles))
-    poses.turn_about_z(links, 0)
 
 
 def slotted_rocker(parameters: Parameters) -> LinkTree:
@@ -53,9 +52,7 @@ def slotted_rocker(parameters: Parameters) -> LinkTree:
         poses.put_about(links, 0, poses.standing_at(links), crank)
         poses.put_about(links, 1, poses.standing_at(links, e), turned)
         pin = crank.arm(a)
-        poses.put_about(links, 2, pin, turned)
-        poses.turn_about_z(links, 0, 1)
-        links.axes[:, :, 2] = turned.arm(np.ones_like(h)).at
+        poses.put_about(links, 2, pin, turned, turned.arm(np.ones_like(h)).at)
         poses.put_pin(links, 0, pin.at)
 
     return LinkTree(
@@ -98,7 +95,6 @@ def rolling_planet(parameters: Parameters) -> LinkTree:
         planet = poses.crank_angle(links, angles, mesh * (n + mesh), np.where(mesh > 0.0, np.pi, 0.0))
         poses.put_about(links, 1, centre, planet)
         poses.put_about(links, 2, poses.standing_at(links), turned)
-        poses.turn_about_z(links, 0, 1, 2)
         ray = carrier.arm(np.ones_like(a)).at
         poses.put_line(links, 0, axis.at + n[..., None] * ray, np.cross(Z, ray))
         pin = centre.plus(planet.arm(k)).at
@@ -156,8 +152,7 @@ def sliding_follower(parameters: Parameters) -> LinkTree:
         foot = poses.standing_at(links, np.sqrt(r0 * r0 - e * e), -e)
         roller = foot.plus(poses.sliding(motion, ("s", "ds", "d2s"), X))
         _put_cam(angles, links, poses.standing_at(links))
-        poses.put_shifted(links, 1, roller)
-        links.axes[:, :, 1] = X
+        poses.put_shifted(links, 1, roller, X)
         poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
 
     follower = LinkBody("follower", "along the lift, to the left of it, along the cam's axis, from the roller",
@@ -174,7 +169,6 @@ def swinging_follower(parameters: Parameters) -> LinkTree:
         roller = pivot.plus(turned.arm(c))
         _put_cam(angles, links, poses.standing_at(links))
         poses.put_about(links, 1, pivot, turned)
-        poses.turn_about_z(links, 1)
         poses.put_line(links, 0, roller.at, np.cross(Z, roller.v - np.cross(Z, roller.at)))
 
     lever = LinkBody("lever", "along the lever, tangential, along its axis, from D")
@@ -191,8 +185,7 @@ def thread_follower(parameters: Parameters, cam_axis: Callable[[Array], Array]) 
         foot = poses.standing_at(links, *dimensions(parameters, designs, "e"))
         end = foot.plus(poses.sliding(motion, ("S", "dS", "d2S"), Y))
         _put_cam(angles, links, centre)
-        poses.put_shifted(links, 1, end)
-        links.axes[:, :, 1] = Y
+        poses.put_shifted(links, 1, end, Y)
         poses.put_line(links, 0, end.at, np.cross(Z, end.v - np.cross(Z, end.at - centre.at)))
 
     follower = LinkBody("follower", "along x, along its way, along the cam's axis, from its end", free=(SLIDE,))
@@ -214,7 +207,7 @@ def eyelet_crank(parameters: Parameters) -> LinkTree:
     def fill(designs: Array, angles: Angles, motion: Columns, links: Links) -> None:
         a, f, alpha = dimensions(parameters, designs, "a", "f", "alpha")
         centre = poses.standing_at(links, 0.0, f * np.sin(alpha), f * np.cos(alpha))
-        poses.put_crank(links, 0, 0, centre, poses.crank_arm(links, angles, alpha, a))
+        poses.put_crank(links, 0, centre, poses.crank_arm(links, angles, alpha, a))
 
     body = LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,))
     return LinkTree((body,), (_bearing("crank"),), (), ("P",), fill, 0, partial(_on_crank, parameters), rubs=False)
@@ -245,9 +238,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
         poses.put_between(links, 1, b, c)
         poses.put_about(links, 2, o3, bell)
         poses.put_about(links, 3, o4, lam)
-        poses.put_shifted(links, 4, shaft)
-        poses.turn_about_z(links, 0, 1, 2, 3)
-        links.axes[:, :, 4] = Y
+        poses.put_shifted(links, 4, shaft, Y)
         poses.put_pin(links, 0, c.at)
         end = o4.plus(lam.arm(o4e)).at
         _put_link(parameters, designs, links, (o3.at, o4.at), (bell.angle - middle, lam.angle))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from kernels.types import Array
-from sweep.families.base import Parameter
-from sweep.families.capabilities import DesignMap, Dimensions, Fixed, Link, constant
+from sweep.families.base import Angles, Columns, Parameter, floats
+from sweep.families.capabilities import DesignMap, Dimensions, Fixed, Link, MovingPoint, constant
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 CRANK, COUPLER, ROCKER = Link("crank", ("a", "b")), Link("coupler", ("b", "c")), Link("rocker", ("d", "c"))
@@ -72,6 +72,23 @@ def standing(
         return np.stack([parameter(parameters, name, designs) for name in (x, y, z)], axis=1)
 
     return Fixed(at, None if axis is None else constant(*axis), kind, zero=constant(*zero))
+
+
+def moving(
+    parameters: tuple[Parameter, ...], sizes: str, needs: tuple[str, ...], place: Callable[..., tuple[Any, Any]]
+) -> MovingPoint:
+    """Return a moving point of the plane z = 0.
+
+    ``place(angles, *sizes, *needs)`` returns x and y, (n, m), from the angles, the parameters ``sizes``, separated by
+    blanks, and the pose outputs ``needs``.
+    """
+
+    def at(designs: Array, angles: Angles, found: Columns) -> Array:
+        given = dimensions(parameters, designs, *sizes.split()), floats(found, *needs)
+        x, y = np.broadcast_arrays(*place(angles, *given[0], *given[1]))
+        return np.stack([x, y, np.zeros_like(x)], axis=-1)
+
+    return MovingPoint(needs, at)
 
 
 def line(of: Callable[[Array], tuple[Array, Array]]) -> Fixed:

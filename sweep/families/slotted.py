@@ -17,14 +17,14 @@ from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, floats
-from sweep.families.capabilities import Assembly, Dimensions, Link, MovingPoint, OutputLink, Skeleton
+from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
 from sweep.families.planar_trees import slotted_rocker
 from sweep.families.poses import poses_of, together
 from sweep.families.sites import AXES
-from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, dimensions, links, standing
+from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, dimensions, links, moving, standing
 
 PARAMETERS = (
     Parameter("a", "length", "crank", positive=True),
@@ -162,11 +162,9 @@ PLANAR_JOINTS = joint_outputs({"b": "crank pin"}, "(1)", ALONG_FRAME)
 planar_poses = poses_of(inverted_slider_crank.poses, inverted_slider_crank.Outputs, {"joints": PLANAR_JOINTS})
 
 
-def slot_foot(designs: Array, angles: Angles, motion: Columns) -> Array:
-    """Foot of the perpendicular from the rocker pivot on the slot, (n, m, 3), at the distance ``h``."""
-    psi = np.asarray(motion["psi"], np.float64)
-    h, e = dimensions(PLANAR_PARAMETERS, designs, "h", "e")
-    return np.stack([e - h * np.sin(psi), h * np.cos(psi), np.zeros_like(psi)], axis=-1)
+def slot_foot(angles: Angles, h: Array, e: Array, psi: Array) -> tuple[Array, Array]:
+    """Foot of the perpendicular from the rocker pivot on the slot, at the distance ``h``."""
+    return e - h * np.sin(psi), h * np.cos(psi)
 
 
 PLANAR = Family(
@@ -188,7 +186,7 @@ PLANAR = Family(
         Skeleton(
             {"a": ORIGIN, "d": standing(PLANAR_PARAMETERS, "e")},
             (CRANK, Link("rocker", ("d", "c", "b"))),
-            {"c": MovingPoint(("psi",), slot_foot)},
+            {"c": moving(PLANAR_PARAMETERS, "h e", ("psi",), slot_foot)},
         ),
     ),
 )

@@ -15,7 +15,7 @@ from kernels.types import Array
 from sweep.families.base import PER_RADIAN, Angles, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import magnitude
-from sweep.families.curve_features import of_members, on_part
+from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
 from sweep.families.machines.happenings import bends_of_threads, event_angles, switches_of_threads
 from sweep.families.machines.main_shaft import ShaftTorque
@@ -172,11 +172,7 @@ def _outputs(placed: list[Member]) -> list[Output]:
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
-    return Assembly(
-        f"{member.name}.{loop.discriminant}", f"{member.name}.{loop.pressure_angle}",
-        partial(on_part, member.designs, loop.scale), f"{member.name}.{loop.stage}",
-        loop.end and (f"{member.name}.{loop.end[0]}", partial(on_part, member.designs, loop.end[1])),
-    )  # fmt: skip
+    return loop.of_part(lambda name: f"{member.name}.{name}", member.designs)
 
 
 def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
