@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ if TYPE_CHECKING:  # families without fused kernels do not wait for the import
     from kernels.chains.form import Form
 
 DesignMap: TypeAlias = Callable[[Array], Array]
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -43,14 +41,12 @@ class Assembly:
 
     def of_part(self, named: Callable[[str], str], part: DesignMap) -> Assembly:
         """Return the loop as one of a chain or a machine: with the names there, and the designs of the part."""
-        end = self.end and (named(self.end[0]), partial(on_part, part, self.end[1]))
-        scale = partial(on_part, part, self.scale)
-        return Assembly(named(self.discriminant), named(self.pressure_angle), scale, named(self.stage), end)
 
+        def whole(values: DesignMap) -> DesignMap:
+            return lambda designs: values(part(designs))
 
-def on_part(part: DesignMap, of_design: Callable[[Array], T], designs: Array) -> T:
-    """Evaluate a function of a stage's or member's designs on designs of the whole."""
-    return of_design(part(designs))
+        end = self.end and (named(self.end[0]), whole(self.end[1]))
+        return Assembly(named(self.discriminant), named(self.pressure_angle), whole(self.scale), named(self.stage), end)
 
 
 def constant(*numbers: float) -> DesignMap:

@@ -14,8 +14,8 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, Stage, Step, Turn
-from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink, on_part
-from sweep.families.curve_features import of_stages
+from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink
+from sweep.families.curve_features import of_stages, on_part
 from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.names import ends_in_digit
 from sweep.families.poses import blocks

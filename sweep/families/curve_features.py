@@ -15,7 +15,7 @@ import numpy as np
 
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Angles, Columns, Family, Stage, floats
-from sweep.families.capabilities import Assembly, DesignMap, on_part
+from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
 from sweep.numerics.curves import PER_GAP
 from sweep.numerics.records import Mask
@@ -23,6 +23,7 @@ from sweep.numerics.records import Mask
 NARROWEST = 1e-9  # angles [rad] closer than this count as one
 SAMPLES_PER_WAVE = 32.0  # of a mechanism: they resolve its order and the next fifteen multiples
 
+T = TypeVar("T")
 Feature = TypeVar("Feature", "Waves", "Switches", "Singular", "Crossing", "Bends")
 SingularCurve: TypeAlias = Callable[[Array, Angles], Array]
 
@@ -285,6 +286,11 @@ def _turned(member: Member, curves: Callable[..., Array], designs: Array, angles
     """Functions of a member driven by the main shaft, at angles of the main shaft."""
     phase = member.phase(designs)
     return curves(member.designs(designs), Angles.of(member.ratio * angles.phi + phase[:, None]), *found)
+
+
+def on_part(part: Callable[[Array], Array], of_design: Callable[[Array], T], designs: Array) -> T:
+    """Evaluate a function of a stage's or member's designs on designs of the whole."""
+    return of_design(part(designs))
 
 
 def _renamed(
