@@ -39,15 +39,6 @@ class Assembly:
     stage: str = ""
     end: tuple[str, DesignMap] | None = None
 
-    def of_part(self, named: Callable[[str], str], part: DesignMap) -> Assembly:
-        """Return the loop as one of a chain or a machine: with the names there, and the designs of the part."""
-
-        def whole(values: DesignMap) -> DesignMap:
-            return lambda designs: values(part(designs))
-
-        end = self.end and (named(self.end[0]), whole(self.end[1]))
-        return Assembly(named(self.discriminant), named(self.pressure_angle), whole(self.scale), named(self.stage), end)
-
 
 def constant(*numbers: float) -> DesignMap:
     """Make a function that returns the same numbers for every design, (n, k)."""

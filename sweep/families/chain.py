@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -14,7 +14,7 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.errors import InputError
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, Stage, Step, Turn
-from sweep.families.capabilities import Assembly, GuidedPoint, LimitLocus, OutputLink
+from sweep.families.capabilities import Assembly, DesignMap, GuidedPoint, LimitLocus, OutputLink
 from sweep.families.curve_features import of_stages, on_part
 from sweep.families.frames import Frame, can_be_placed, stage_frames
 from sweep.families.names import ends_in_digit
@@ -153,8 +153,15 @@ def _precise(stages: tuple[Stage, ...]) -> tuple[Stage, ...]:
     return tuple(replace(stage, family=stage.family.precise()) for stage in stages)
 
 
+def loop_of_part(loop: Assembly, named: Callable[[str], str], part: DesignMap) -> Assembly:
+    """Return the loop of a stage or member as one of the whole: with the names there, and the designs of the part."""
+    end = loop.end and (named(loop.end[0]), partial(on_part, part, loop.end[1]))
+    scale = partial(on_part, part, loop.scale)
+    return Assembly(named(loop.discriminant), named(loop.pressure_angle), scale, named(loop.stage), end)
+
+
 def _loop(stage: Stage, loop: Assembly) -> Assembly:
-    return loop.of_part(lambda name: f"{name}{stage.number}", stage.designs)
+    return loop_of_part(loop, lambda name: f"{name}{stage.number}", stage.designs)
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

@@ -14,7 +14,7 @@ from kernels.status import OK
 from kernels.types import Array
 from sweep.families.base import PER_RADIAN, Angles, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly
-from sweep.families.chain import magnitude
+from sweep.families.chain import loop_of_part, magnitude
 from sweep.families.curve_features import of_members
 from sweep.families.frames import Frame
 from sweep.families.machines.happenings import bends_of_threads, event_angles, switches_of_threads
@@ -172,7 +172,7 @@ def _outputs(placed: list[Member]) -> list[Output]:
 
 
 def _loop(member: Member, loop: Assembly) -> Assembly:
-    return loop.of_part(lambda name: f"{member.name}.{name}", member.designs)
+    return loop_of_part(loop, lambda name: f"{member.name}.{name}", member.designs)
 
 
 def _precise_poses(machine: Machine, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:
