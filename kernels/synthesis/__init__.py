@@ -1,10 +1,9 @@
 """Link lengths from the required motion of the follower: loci of the driven joint and tests a mechanism must pass.
 
-``rssr_locus`` and ``rssp_locus`` find the mechanisms of requirements; ``acceptance`` has the tests, the ends of the
-admissible arcs and the sensitivities of limit positions; ``heddle`` synthesises heddle drives.
+``rssr_locus`` and ``rssp_locus`` find the mechanisms of requirements; ``acceptance`` has the tests and the ends of the
+admissible arcs; ``heddle`` synthesises heddle drives.
 """
 
-from kernels.synthesis.acceptance import limit_sensitivities as limit_sensitivities
 from kernels.synthesis.acceptance import rssp_arc_ends as rssp_arc_ends
 from kernels.synthesis.acceptance import rssr_arc_ends as rssr_arc_ends
 from kernels.synthesis.rssp_locus import rssp_at_offset as rssp_at_offset

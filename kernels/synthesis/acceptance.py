@@ -1,7 +1,7 @@
-"""Acceptance tests of a synthesised mechanism, ends of the admissible arcs of its locus, sensitivities of its limits.
+"""Acceptance tests of a synthesised mechanism, and ends of the admissible arcs of its locus.
 
 The acceptance tests are made in the order of docs/synthesis.md, section 3; the arcs end at crank angles phi1 at which
-the side condition changes; the limit positions of a crank-rocker move with its dimensions by equation (16) there.
+the side condition changes.
 """
 
 from __future__ import annotations
@@ -111,59 +111,3 @@ def rssp_arc_ends(requirements: Array, ends: Array) -> None:
         ends[i, 0], ends[i, 1] = 0.5 * math.pi, 1.5 * math.pi
         ends[i, 2], ends[i, 3] = second % TWO_PI, (second + math.pi) % TWO_PI
         ends[i].sort()
-
-
-PARAMETERS = ("a", "b", "c", "e", "f", "g", "alpha")
-
-
-@inline
-def _at_limit(designs: Array, i: int, psi: float, phi: float, rates: Array, place: int) -> None:
-    """Write dpsi/dp into rates[i, :, place] and dphi/dp into rates[i, :, place + 1], for the seven parameters p."""
-    a, b, c, e = designs[i, 0], designs[i, 1], designs[i, 2], designs[i, 3]
-    f, g = designs[i, 4], designs[i, 5]
-    sa, ca = sine_cosine(designs[i, 6])
-    s, co = sine_cosine(psi)
-    v, u = sine_cosine(phi)
-    # ball in the crank frame; coupler d = C - B; c T = dF/dpsi/2
-    xc, yc, ze = e + c * co, c * ca * s - g * sa, c * sa * s + g * ca
-    dx, dy, dz = xc - a * u, c * s - (f * sa + a * ca * v), g - (f * ca - a * sa * v)
-    ct = c * (dy * co - dx * s)
-    rho2 = xc * xc + yc * yc
-    h = (
-        a - (u * xc + v * yc),
-        -b,
-        dx * co + dy * s,
-        dx,
-        f - ze,
-        dz,
-        dz * (f * sa + a * ca * v) - dy * (f * ca - a * sa * v),
-    )
-    direct_x = (0.0, 0.0, co, 1.0, 0.0, 0.0, 0.0)
-    direct_y = (0.0, 0.0, ca * s, 0.0, 0.0, -sa, -ze)
-    for p in range(7):
-        dpsi = -h[p] / ct
-        turned = xc * (direct_y[p] + c * ca * co * dpsi) - yc * (direct_x[p] - c * s * dpsi)
-        rates[i, p, place], rates[i, p, place + 1] = dpsi, turned / rho2
-
-
-@kernel
-def limit_sensitivities(
-    designs: Array, psi_ext: Array, phi_ext: Array, psi_fold: Array, phi_fold: Array, rates: Array
-) -> None:
-    """Compute derivatives of both limit positions with respect to every dimension.
-
-    At a limit dpsi/dphi = 0, so the derivative of the rocker's limit angle is that of psi at a fixed crank angle.
-
-    Parameters
-    ----------
-    designs : (n, 8) a, b, c, e, f, g, alpha, branch
-    psi_ext, phi_ext, psi_fold, phi_fold : (n,) the limit positions [rad]
-    rates : (n, 7, 4) out: per dimension of PARAMETERS the derivatives of psi_ext, phi_ext, psi_fold, phi_fold
-        [rad/length, 1 for alpha]; nan goes through
-    """
-    for i in range(designs.shape[0]):
-        if math.isnan(psi_ext[i]):
-            rates[i] = math.nan
-        else:
-            _at_limit(designs, i, psi_ext[i], phi_ext[i], rates, 0)
-            _at_limit(designs, i, psi_fold[i], phi_fold[i], rates, 2)

@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from kernels import synthesis as kernels
-from kernels.synthesis.acceptance import PARAMETERS
 from sweep.errors import InputError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
-from sweep.families.base import Accuracy, Array, floats
+from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, outputs_of, pressure_limit
 from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, ranges, turning
 
@@ -21,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _EXACT = Accuracy(target=1e-12)
+STEP = 1e-30  # imaginary step of a dimension: the error is of order STEP^2, without cancellation
 ALONE = 10.0  # ratio of sensitivities above which a dimension adjusts one quantity alone
 
 
@@ -130,16 +129,18 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
     import pandas as pd
 
     matrix, _ = design_matrix(RSSR, design)
-    names = ("psi_ext", "phi_ext", "psi_fold", "phi_fold")
-    limits = design_outputs(RSSR, matrix, names, _EXACT)
+    limits = design_outputs(RSSR, matrix, ("phi_ext", "phi_fold"), _EXACT)
     if limits["status"][0] != 0:
         raise InputError("design", dict(design), "a crank-rocker that turns fully and oscillates", "adjustments")
-    rates = np.empty((1, len(PARAMETERS), 4))
-    arguments = [matrix, *floats(limits, *names), rates]
-    kernels.limit_sensitivities(*arguments)
-    psi_ext, phi_ext, psi_fold, phi_fold = rates[0].T
+    dimensions = RSSR.parameter_names[:-1]
+    stepped = matrix + 1j * STEP * np.eye(len(dimensions), matrix.shape[1])
+    angles = Angles.of(np.array([[limits["phi_ext"][0], limits["phi_fold"][0]]], np.complex128))
+    poses = RSSR.poses(stepped, angles, frozenset({"psi", "dpsi", "d2psi"}))
+    # At a limit dpsi/dphi is 0 and stays 0: psi changes as at a fixed crank angle, and phi by -(d dpsi/dp)/d2psi.
+    psi_ext, psi_fold = poses["psi"].T.imag / STEP
+    phi_ext, phi_fold = -poses["dpsi"].T.imag / STEP / poses["d2psi"].T.real
     swing, phi0 = psi_fold - psi_ext, phi_fold - phi_ext
-    units = np.where(np.array(PARAMETERS) == "alpha", 1.0, matrix[0, 2])  # lengths relative to the rocker
+    units = np.where(np.array(dimensions) == "alpha", 1.0, matrix[0, 2])  # lengths relative to the rocker
     frame = pd.DataFrame(
         {
             "dswing": swing,
@@ -148,7 +149,7 @@ def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
             "dpsi_fold": psi_fold,
             "adjusts": [_adjusts(*pair) for pair in zip(np.abs(swing * units), np.abs(phi0 * units), strict=True)],
         },
-        index=pd.Index(PARAMETERS, name="dimension"),
+        index=pd.Index(dimensions, name="dimension"),
     )
     frame.attrs["units"] = dict.fromkeys(("dswing", "dphi0", "dpsi_ext", "dpsi_fold"), "rad per unit of the dimension")
     return frame
