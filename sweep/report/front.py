@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,19 @@ from sweep.report.quantities import ShownQuantity, change, number
 from sweep.study import ParetoSettings
 
 EDGES = (" at its lower bound", " at its upper bound")
+
+
+@dataclass(frozen=True)
+class FrontRow:
+    """The optimum within one bound, in words; ``held`` names the active limits, or those that gave way."""
+
+    bound: str
+    value: str
+    fast: str
+    change: str
+    second: str
+    state: str
+    held: str
 
 
 @dataclass(frozen=True)
@@ -45,7 +57,7 @@ class Front:
         """Side of its bounds on which the second output lies, in words."""
         return "at least" if self.settings.at_least else "at most"
 
-    def rows(self) -> list[SimpleNamespace]:
+    def rows(self) -> list[FrontRow]:
         """Return for every bound the minimised objective within it, its change against the optimum, active limits."""
         objective, second, optimum = self.objective, self.second, self.data.optimum
         best = math.nan if optimum is None else float(optimum[objective.name])
@@ -54,7 +66,7 @@ class Front:
             value, missed = float(point[objective.name]), is_missed(point)
             relaxed, active = str(point["relaxation"]), str(point["active"])
             rows.append(
-                SimpleNamespace(
+                FrontRow(
                     bound=f"{self.side} {second.show(float(point['bound']))}",
                     value="–" if missed else objective.show(value),
                     fast="" if missed else objective.at_speed(value, self.data.study.speed),

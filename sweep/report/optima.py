@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -152,12 +151,27 @@ SAMPLES = 2048  # mechanisms sampled per optimum: a share accurate to 1 %
 EXTRAS = ("least_link", "arm_ratio")
 
 
-def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[SimpleNamespace]:
-    """Return the cards of the first optima, with pictures to one scale; empty if there is only one.
+@dataclass(frozen=True)
+class Card:
+    """One optimum as the report shows it, in words.
 
-    ``made`` is the yield of its manufactured mechanisms, in words; empty without tolerances.  ``sizes`` are the
-    dimensions as name and value, ``extras`` outputs of the dimensions.
+    ``made`` is the yield of its manufactured mechanisms; empty without tolerances.  ``sizes`` are the dimensions as
+    name and value, ``extras`` outputs of the dimensions.
     """
+
+    title: str
+    objective: str
+    against: str
+    starts: int
+    mirrored: int
+    made: str
+    sizes: list[tuple[str, str]]
+    extras: list[tuple[str, str]]
+    picture: str | None
+
+
+def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[Card]:
+    """Return the cards of the first optima, with pictures to one scale; empty if there is only one."""
     objective, names = data.objective, data.study.bare.parameter_names
     tilts = {name for name in names if name.endswith("_tilt")}  # tilts of nominal designs are zero
     if len(distinct) < 2 or objective is None:
@@ -172,7 +186,7 @@ def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[SimpleNamespa
         shown = [x for x in parameter_rows(data, group.row, 4) if x.name in names]
         title = group.title(k)
         cards.append(
-            SimpleNamespace(
+            Card(
                 title=title,
                 objective=f"{objective.words} {objective.show(value)}",
                 against="" if k == 0 else change(objective, value, best),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,17 +31,31 @@ ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the ro
 
 
 @dataclass(frozen=True)
+class SpeedRow:
+    """Sewing at one speed: the window of the rise, the end of it that binds the optimum, shares that keep the moments.
+
+    ``shares`` keep each moment, then the least and the most rise; ``every``, with its ``interval``, keeps them all.
+    """
+
+    speed: str
+    window: str
+    binds: str
+    shares: list[str]
+    every: str
+    interval: str
+
+
+@dataclass(frozen=True)
 class Sewn:
     """Shares of manufactured mechanisms by speed: rows of the stated speeds, curves between them; the answer in words.
 
     ``shares`` (S,) keep all moments, with 95 % confidence between ``low`` and ``high``; ``ends`` are the shares that
-    keep the least and the most permitted rise.  A row has the window of the rise, the end of it that binds the optimum,
-    ``shares`` that keep each moment, then the least and the most rise, and ``every`` with its ``interval`` for all.
+    keep the least and the most permitted rise.
     """
 
     sentence: str
     moments: tuple[str, ...]
-    rows: tuple[SimpleNamespace, ...]
+    rows: tuple[SpeedRow, ...]
     count: int
     speeds: Array
     shares: Array
@@ -73,7 +86,7 @@ def sewn(data: Dataset) -> Sewn | None:
     moments = tuple(name for name in meets if name not in ends)
     meets_all = np.logical_and.reduce(list(meets.values()))
     rows = tuple(
-        SimpleNamespace(
+        SpeedRow(
             speed=f"{stated[k] / RPM:.6g}",
             window=f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
             binds=_binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),

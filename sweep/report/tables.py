@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -144,7 +143,21 @@ class Fate:
     percent: float
 
 
-def output_rows(data: Dataset) -> list[SimpleNamespace]:
+@dataclass(frozen=True)
+class OutputRow:
+    """One output of the result beside the reference; values with ``fast`` are those at the study's speed."""
+
+    name: str
+    symbol: str
+    text: str
+    value: str
+    fast: str
+    reference: str
+    reference_fast: str
+    change: str
+
+
+def output_rows(data: Dataset) -> list[OutputRow]:
     """Return the wanted outputs in designers' units, compared with the reference, the objective first."""
     study = data.study
     objective = [data.objective.name] if data.objective is not None else []
@@ -154,7 +167,7 @@ def output_rows(data: Dataset) -> list[SimpleNamespace]:
         value, other = value_of(data.result, name), value_of(data.reference, name)
         flag = is_flag(name)
         rows.append(
-            SimpleNamespace(
+            OutputRow(
                 name=name,
                 symbol=shown.symbol,
                 text=data.definitions.get(name, shown.words).removeprefix(f"negative of {without_minus(name)}: "),
