@@ -32,10 +32,7 @@ ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the ro
 
 @dataclass(frozen=True)
 class SpeedRow:
-    """Sewing at one speed: the window of the rise, the end of it that binds the optimum, shares that keep the moments.
-
-    ``shares`` keep each moment, then the least and the most rise; ``every``, with its ``interval``, keeps them all.
-    """
+    """Sewing at one speed: window of the rise, the end that binds the optimum, shares that keep each moment and all."""
 
     speed: str
     window: str
@@ -49,8 +46,7 @@ class SpeedRow:
 class Sewn:
     """Shares of manufactured mechanisms by speed: rows of the stated speeds, curves between them; the answer in words.
 
-    ``shares`` (S,) keep all moments, with 95 % confidence between ``low`` and ``high``; ``ends`` are the shares that
-    keep the least and the most permitted rise.
+    ``shares`` (S,) keep all moments, 95 % confidence from ``low`` to ``high``; ``ends`` the least or the most rise.
     """
 
     sentence: str
