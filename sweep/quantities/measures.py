@@ -22,6 +22,9 @@ from sweep.quantities.resolve import find, resolve
 
 # Least Delta/b^2 at the worst pose of a crank that turns: cos^2 of 89.94 degrees.
 ROTATABLE_MARGIN = 1e-6
+# sin^2 of a pressure angle of 1.5e-8 rad: below it the slope of cos^2 is a rounding error, which must not be magnified.
+SLOPELESS = 2.0**-52
+SMALLEST_ANGLE = 2.0**-26  # its root
 
 Kind: TypeAlias = Literal[
     "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
@@ -110,6 +113,12 @@ class Measure:
         right = 0.0 <= low < 0.5 * math.pi and (maximum is None or 0.0 < high < 0.5 * math.pi)
         return "angles between 0 and 90 deg" if self.inner in ("pressure", "transmission") and not right else ""
 
+    def nearest(self, bound: float) -> float:
+        """Return the nearest bound that the inner value can represent to one that is :meth:`refused`."""
+        if self.kind == "minus":
+            return -self.parts[0].nearest(-bound)
+        return min(max(bound, SMALLEST_ANGLE), 0.5 * math.pi - SMALLEST_ANGLE)
+
     def to_inner(self, value: float) -> float:
         """Convert a value of the output to its inner value."""
         if self.kind == "minus":
@@ -148,9 +157,9 @@ class Measure:
         if self.kind == "minus":
             return self.parts[0].output_slope(-inner)
         if self.inner == "pressure":  # inner = -cos^2 of the angle
-            return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), 1e-300)))
+            return 1.0 / (2.0 * math.sqrt(max(-inner * (1.0 + inner), SLOPELESS)))
         if self.inner == "transmission":  # inner = sin^2 of the angle
-            return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), 1e-300)))
+            return 1.0 / (2.0 * math.sqrt(max(inner * (1.0 - inner), SLOPELESS)))
         if self.inner == "ratio":
             return self.cycle / (self.cycle - inner) ** 2
         if self.inner == "square":

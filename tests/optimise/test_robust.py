@@ -18,7 +18,7 @@ from sweep.families import family
 from sweep.jobs.signals import Deadline
 from sweep.optimise import Problem, explore, read_survey
 from sweep.optimise.local.model import Model
-from sweep.optimise.manufacture.margins import Scatter, with_margins
+from sweep.optimise.manufacture.margins import Scatter, prices, with_margins
 from sweep.optimise.manufacture.sample import Sampler, manufactured
 from sweep.optimise.problem.program import Program
 from sweep.study import Limit, OptimiseSettings, Tolerance, load_study, study_from_data
@@ -149,6 +149,23 @@ def test_band_narrower_than_its_room_is_missed_and_no_equation() -> None:
         model = Model(drawn_in, Program(drawn_in), start, lambda: False)
         state = model.state(drawn_in.scaled(start[None, :])[0])
         assert (state.violation > 1e-4) == missed and not any(state.form.equal)
+
+
+def test_room_wider_than_a_pressure_limit_is_missed_and_no_error() -> None:
+    """The limit cannot be drawn in below 0 degrees: there the search would read it as a positive angle."""
+    limits = (Limit("swing", 0.5, 0.6), Limit("max_pressure_angle", None, 0.2 * math.pi / 180.0))
+    lever, lower, upper = family("inverted_slider_crank"), np.array([20.0, 80.0]), np.array([45.0, 150.0])
+    problem = Problem(lever, ("a", "e"), lower, upper, {"h": 0.1, "branch": 1.0}, "max_abs_d2psi", limits)
+    start = problem.rows(np.array([38.0, 140.0]))[0]
+    # asin(h/(e - a)) is 0.06 deg, and 0.05 and 1 mm of h are three standard deviations of 0.01 and 0.19 deg.
+    for lengths, missed in ((0.05, False), (1.0, True)):
+        levels = {"swing": 2.0, "max_pressure_angle": 2.0}
+        scatter = Scatter(problem, Tolerance(lengths, 0.0, 0.95))
+        drawn_in = with_margins(scatter, start, levels, None)
+        model = Model(drawn_in, Program(drawn_in), start, lambda: False)
+        state = model.state(drawn_in.scaled(start[None, :])[0])
+        assert (state.violation > 1e-4) == missed
+        assert set(prices(scatter, start, levels)) == set(levels)
 
 
 def test_band_of_an_equation_is_two_bounds() -> None:

@@ -101,6 +101,18 @@ def test_shared_extrema_have_the_slopes_of_both_sides_whether_least_or_largest()
         assert row.shrinking == pytest.approx(-growing, rel=1e-12), output
 
 
+def test_pressure_angle_of_nothing_has_no_endless_slope() -> None:
+    """A slotted lever in line has no pressure angle; with the offset h the sine of its largest is h/(e - a)."""
+    lever, outputs = family("inverted_slider_crank"), ("max_pressure_angle", "least_transmission_angle")
+    for offset, known in ((0.0, 0.0), (1e-12, 0.0), (1e-3, 1.0 / 80.0)):
+        table = pd.DataFrame(sensitivities(lever, np.array([30.0, 110.0, offset, 1.0]), outputs))
+        slopes = table[table.parameter == "h"].set_index("output").growing
+        # Below 1.5e-8 rad the angle is lost in the rounding of its cosine; at 1e-3/80 rad six digits of its slope stay.
+        assert slopes.max_pressure_angle == pytest.approx(known, rel=1e-6, abs=1e-7)
+        assert slopes.least_transmission_angle == pytest.approx(-known, rel=1e-6, abs=1e-7)
+        assert table[table.parameter == "a"].growing.abs().max() < 1e-6
+
+
 def test_a_curve_that_is_the_same_all_over_the_turn_has_the_slopes_of_every_angle() -> None:
     """A tool on the axis of its rocker weighs what it weighs; beside it, m (psi'' e_t - psi'^2 e_r) omega^2 more."""
     mass, weight, omega = 0.2, 3.0, 10.0

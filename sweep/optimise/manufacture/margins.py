@@ -23,6 +23,7 @@ from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, toleranc
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import meets
+from sweep.quantities.measures import measure
 from sweep.study import Limit, Tolerance
 
 SHIFTS = (0.2, 0.1, 0.05)  # steps of the compass search [standard deviations]; finer ones follow the sample's noise
@@ -107,7 +108,7 @@ def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float 
     curves = {key: curve.times(levels[key]) for key, curve in scatter.curves.items()}
     fixed = {name: (levels[keys[name]] * spread, value) for name, (spread, value) in scatter.single.items()}
     # A band narrower than both margins becomes infeasible until a design needs smaller ones.
-    limits = tuple(x.drawn_in(fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
+    limits = tuple(_drawn_in(problem, x, fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
     close = [x.output for x in problem.limits if x.output in fixed and _is_close(x, *fixed[x.output])]
     allowances = {name: change.times(levels[keys[name]]) for name, change in scatter.changes(close).items()}
     lower, upper = problem.lower, problem.upper
@@ -141,7 +142,8 @@ def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
     model = Model(tight, Program(tight), design, lambda: False)
     state = model.state(tight.scaled(design[None, :])[0])
     duals, form, points = model.certificate(state), state.form, state.form.points
-    limits = tuple(x.drawn_in(BOUND_STEP * spreads[x.output][0]) if x.output in spreads else x for x in tight.limits)
+    step = {name: BOUND_STEP * spread for name, (spread, _) in spreads.items()}
+    limits = tuple(_drawn_in(tight, x, step[x.output]) if x.output in step else x for x in tight.limits)
     shifted = Program(replace(tight, limits=limits)).lay_out(model.curves, design, points, form.complete, model.scale)
     change = (form.rows(state.atoms, 0.0) - shifted.rows(state.atoms, 0.0)) / BOUND_STEP
     price, weight = dict.fromkeys(keys.values(), 0.0), dict.fromkeys(units, 0.0)
@@ -186,6 +188,16 @@ def excesses(problem: Problem, outputs: Mapping[str, Array], units: Mapping[str,
         excess = np.where(np.isnan(excess), math.inf, excess)
         out[key] = np.maximum(out[key], excess) if key in out else excess
     return {key: np.where(failing, math.inf, excess) for key, excess in out.items()}
+
+
+def _drawn_in(problem: Problem, limit: Limit, margin: float) -> Limit:
+    """Return the limit tightened by a margin, at most to the end of the values that its output can have."""
+    drawn, quantity = limit.drawn_in(margin), measure(problem.family, limit.output, problem.window)
+    if not quantity.refused(drawn.minimum, drawn.maximum):
+        return drawn
+    # No design keeps it: like a band narrower than its margins, it is missed until a design needs a smaller margin.
+    low, high = (x if x is None else quantity.nearest(x) for x in (drawn.minimum, drawn.maximum))
+    return replace(drawn, minimum=low, maximum=high)
 
 
 def _is_close(limit: Limit, margin: float, value: float) -> bool:
