@@ -114,7 +114,7 @@ class Measure:
         return "angles between 0 and 90 deg" if self.inner in ("pressure", "transmission") and not right else ""
 
     def nearest(self, bound: float) -> float:
-        """Return the nearest bound that the inner value can represent to one that is :meth:`refused`."""
+        """Return the nearest bound that the inner value can represent to one that it refuses."""
         if self.kind == "minus":
             return -self.parts[0].nearest(-bound)
         return min(max(bound, SMALLEST_ANGLE), 0.5 * math.pi - SMALLEST_ANGLE)
