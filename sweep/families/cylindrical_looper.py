@@ -12,9 +12,9 @@ from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Dimensions, Link, MovingPoint, Skeleton
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
-from sweep.families.poses import poses_of
+from sweep.families.poses import filled_by, poses_of
 from sweep.families.skeletons import crank_axis, links, parameter, squared, standing
 
 PARAMETERS = (

@@ -22,7 +22,7 @@ from sweep.families.outputs import joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import chosen, filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
-from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, parameter, standing
+from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, moving, parameter, standing
 from sweep.numerics.records import Mask
 
 ROCKER = (
@@ -242,28 +242,24 @@ def rocker_pin(designs: Array, angles: Angles, found: Columns) -> Array:
     return np.stack([e + arm * np.cos(psi + ahead), arm * np.sin(psi + ahead), 0.0 * psi], axis=-1)
 
 
+def _on_circle(angles: Angles, x: Array, y: Array, radius: Array, ahead: Array) -> tuple[Array, Array]:
+    return x + radius * np.cos(angles.phi + ahead), y + radius * np.sin(angles.phi + ahead)
+
+
 def eccentric(number: int) -> MovingPoint:
     """Point of the skeleton: centre of an eccentric."""
+    sizes = " ".join(f"{name}{number}" for name in ("xE", "yE", "rE", "dE"))
+    return moving(TRIAD_PARAMETERS, sizes, (), _on_circle)
 
-    def at(designs: Array, angles: Angles, found: Columns) -> Array:
-        names = (f"{name}{number}" for name in ("xE", "yE", "rE", "dE"))
-        x, y, radius, ahead = dimensions(TRIAD_PARAMETERS, designs, *names)
-        turn = angles.phi + ahead
-        return np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn), 0.0 * turn], axis=-1)
 
-    return MovingPoint((), at)
+def _on_rack(angles: Angles, along: Array, across: Array, x: Array, y: Array, chi: Array) -> tuple[Array, Array]:
+    cos, sin = np.cos(chi), np.sin(chi)
+    return x + along * cos - across * sin, y + along * sin + across * cos
 
 
 def rack_joint(number: int) -> MovingPoint:
     """Point of the skeleton: joint of a link on the rack."""
-
-    def at(designs: Array, angles: Angles, found: Columns) -> Array:
-        x, y, chi = floats(found, "x_t", "y_t", "chi")
-        along, across = dimensions(TRIAD_PARAMETERS, designs, f"f{number}x", f"f{number}y")
-        cos, sin = np.cos(chi), np.sin(chi)
-        return np.stack([x + along * cos - across * sin, y + along * sin + across * cos, 0.0 * chi], axis=-1)
-
-    return MovingPoint(("x_t", "y_t", "chi"), at)
+    return moving(TRIAD_PARAMETERS, f"f{number}x f{number}y", ("x_t", "y_t", "chi"), _on_rack)
 
 
 _SURELY = 1e-6  # relative excess of a side over the sum of the others, above rounding of a rocker pin

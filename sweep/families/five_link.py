@@ -10,9 +10,9 @@ from kernels.linkage.bodies import DRIVEN
 from sweep.families import rssr as crank_rocker
 from sweep.families.base import Array, Family, Output, Parameter
 from sweep.families.capabilities import Assembly, Link, OutputLink, Skeleton
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import poses_of
+from sweep.families.poses import filled_by, poses_of
 from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
 PARAMETERS = (

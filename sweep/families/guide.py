@@ -101,7 +101,7 @@ def tool_point(designs: Array) -> Array:
 
 def tool_direction(designs: Array) -> Array:
     """Return the unit vector of the guiding line, (n, 3)."""
-    return np.column_stack([np.cos(designs[:, 6]), np.sin(designs[:, 6]), 0.0 * designs[:, 6]])
+    return guiding_line(designs)[1]
 
 
 def _of_point(axis: str, designs: Array) -> Array:

@@ -105,16 +105,6 @@ class LinkTree:
         return [body for body, _ in self.freedoms].index(joint.body) if own else -1
 
 
-def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> LinkFill:
-    """Make a fill function from a kernel(designs, cos, sin, motion, out) with the outputs ``needs`` in one array."""
-
-    def fill(designs: Array, angles: Angles, motion: Columns, out: Links) -> None:
-        given = np.stack(floats(motion, *needs))
-        kernel(designs, angles.cos, angles.sin, given, out)
-
-    return fill
-
-
 _Z = np.array([0.0, 0.0, 1.0])
 
 

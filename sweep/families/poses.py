@@ -24,7 +24,7 @@ from numpy.typing import DTypeLike
 
 from kernels.status import INVALID_INPUT, OK
 from kernels.types import TWO_PI, Array, Status
-from sweep.families.base import Accuracy, Angles, Columns, Domain, Family, Interval, Output, PoseFunction, Step
+from sweep.families.base import Accuracy, Angles, Columns, Domain, Family, Interval, Output, PoseFunction, Step, floats
 from sweep.families.capabilities import DesignMap
 
 
@@ -74,6 +74,18 @@ def filled_all(
     out = np.empty((len(names), *status.shape), dtype)
     kernel(*arguments, status, out)
     return chosen(dict(zip(names, out, strict=True)), wanted, status)
+
+
+def filled_by(kernel: Callable[..., object], needs: tuple[str, ...]) -> Callable[..., None]:
+    """Make the function that fills joint records or bodies from the pose outputs ``needs``, with their kernel.
+
+    It takes designs, angles, pose outputs and what ``kernel(designs, cos, sin, motion, *out)`` fills.
+    """
+
+    def fill(designs: Array, angles: Angles, motion: Columns, *out: Any) -> None:
+        kernel(designs, angles.cos, angles.sin, np.stack(floats(motion, *needs)), *out)
+
+    return fill
 
 
 def poses_of(

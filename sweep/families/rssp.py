@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from kernels.families import rssp
 from kernels.types import EPS, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, floats
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import Made, chosen, following, move_records, poses_of, step_of
+from sweep.families.poses import Made, chosen, filled_by, following, move_records, poses_of, step_of
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, squared, standing
 
 PARAMETERS = (
@@ -119,12 +119,7 @@ def limit_positions(designs: Array, wanted: frozenset[str], accuracy: Accuracy) 
 
 
 _JOINT_NEEDS = ("s", "ds", "d2s", "discriminant")
-
-
-def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records of the effects from the pose outputs in ``motion``."""
-    given = np.stack(floats(motion, *_JOINT_NEEDS))
-    rssp.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
+joint_records = filled_by(rssp.joints, _JOINT_NEEDS)  # of the effects
 
 
 def ellipse(designs: Array) -> Array:
@@ -137,11 +132,6 @@ def ellipse(designs: Array) -> Array:
 _NAMES = ("s", "ds", "d2s", "d3s")
 CURVES = {name: can.FusedOutput(order, can.constant(1.0, 0.0, 0.0)) for order, name in enumerate(_NAMES)}
 COMPONENTS = {"ds": "x1", "d2s": "x2", "d3s": "x3"}
-
-
-def opening(designs: Array, status: NDArray[np.uint8], distance: Array) -> None:
-    """Write status and distance [rad] of the nearest complex singularity, for every design."""
-    rssp.opening(np.ascontiguousarray(designs), status, distance)
 
 
 FAMILY = Family(
@@ -161,7 +151,7 @@ FAMILY = Family(
     capabilities=(
         SLIDER_CRANK_SIZES,
         can.Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "b")),
-        can.InSeries(rssp.FORM, CURVES, COMPONENTS, opening),
+        can.InSeries(rssp.FORM, CURVES, COMPONENTS, rssp.opening),
         can.JointRecords(joint_records, _JOINT_NEEDS, "slider"),
         can.PressureEllipse(ellipse),
         can.LimitLocus("stroke"),

@@ -11,10 +11,10 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.types import TWO_PI, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
-from sweep.families.poses import chosen, move_records, on_matrix, optional_outputs, poses_of, together
+from sweep.families.poses import chosen, filled_by, move_records, on_matrix, optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
@@ -97,12 +97,7 @@ def precise_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Col
 
 
 JOINT_NEEDS = ("cos_psi", "sin_psi", "dpsi", "d2psi", "discriminant")
-
-
-def joint_records(designs: Array, angles: Angles, motion: Columns, per_pose: Array, per_design: Array) -> None:
-    """Fill the joint records of the effects from the pose outputs in ``motion``."""
-    given = np.stack(floats(motion, *JOINT_NEEDS))
-    rssr.joints(designs, angles.cos, angles.sin, given, per_pose, per_design)
+joint_records = filled_by(rssr.joints, JOINT_NEEDS)  # of the effects
 
 
 def ellipse(designs: Array) -> Array:

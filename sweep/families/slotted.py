@@ -19,10 +19,10 @@ from kernels.types import Array
 from sweep.families.base import Angles, Columns, Family, Output, Parameter, floats
 from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
-from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, filled_by
+from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, ladders, point_outputs
 from sweep.families.planar_trees import slotted_rocker
-from sweep.families.poses import poses_of, together
+from sweep.families.poses import filled_by, poses_of, together
 from sweep.families.sites import AXES
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, dimensions, links, moving, standing
 
