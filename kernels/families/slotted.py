@@ -20,7 +20,7 @@ from kernels.arithmetic.vectors import add, cross, dot, mix, scale, spun, sub
 from kernels.jit import inline, kernel
 from kernels.linkage import bodies as tree
 from kernels.linkage.outputs import put_block, write
-from kernels.linkage.verdict import pose_status
+from kernels.linkage.verdict import follower_status
 from kernels.types import EPS, Array, Numbers, Status
 
 
@@ -120,7 +120,7 @@ def _closure(r: Reduced, u: Any, v: Any, is_bar: bool) -> Ball:
     tolerance = error * (abs(x.real) * r.x_size + abs(y.real) * r.y_size + abs(q.real) * q_size)
     tolerance += error * error * (r.x_size * r.x_size + r.y_size * r.y_size + q_size * q_size)
     if code == st.OK:
-        code = pose_status(True, delta.real, tolerance, rr.real)
+        code = follower_status(True, rr.real <= tolerance, delta.real, tolerance)
     return Ball(code, x, y, z, arm, q, rr, delta)
 
 

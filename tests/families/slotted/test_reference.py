@@ -207,6 +207,7 @@ def test_slotted_complex_step_gives_exact_gradients(design):
         ({}, st.OK),
         ({"s": 5.0}, st.NOT_ASSEMBLED),
         ({"e": 1.0}, st.SINGULAR),  # the ball on the driven axis
+        ({"e": 1.0, "s": 0.2, "alpha": 0.0}, st.SINGULAR),  # there with an offset of the slot too: it was out of reach
         ({"e": 2.0, "s": 1.0, "alpha": 0.0}, st.DEAD_POINT),
         ({"k": 1.0, "g": 3.0}, st.NOT_ASSEMBLED),  # the arm does not reach the ball's height
         ({"k": 3.0, "g": 3.0}, st.SINGULAR),  # the arm along the driven axis
