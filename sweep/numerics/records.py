@@ -13,8 +13,8 @@ Mask: TypeAlias = NDArray[np.bool_]
 Record = TypeVar("Record", bound=tuple[Any, ...])
 
 
-def only(record: Record, which: Indices | Mask) -> Record:
-    """Select rows of a named tuple of columns by index or mask."""
+def only(record: Record, which: Indices | Mask | list[int] | slice) -> Record:
+    """Select rows of a named tuple of columns by index, mask or slice."""
     return type(record)(*(column[which] for column in record))
 
 

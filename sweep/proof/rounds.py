@@ -21,7 +21,7 @@ from sweep.dataset import files
 from sweep.families.base import Array
 from sweep.jobs.executors import Executor
 from sweep.jobs.signals import Stop
-from sweep.numerics.records import Mask
+from sweep.numerics.records import joined, only
 from sweep.proof.question import Question
 from sweep.study import ProveSettings
 
@@ -42,16 +42,6 @@ class Leaves(NamedTuple):
     theta: Array
     factors: Array
 
-    @property
-    def open(self) -> Mask:
-        """Mask of the boxes that the next round halves."""
-        mask: Mask = self.outcome == OPEN
-        return mask
-
-    def taken(self, which: Numbers) -> Leaves:
-        """Select rows of the table by index or mask."""
-        return Leaves(*(column[which] for column in self))
-
 
 def empty(rows: int, free: int) -> Leaves:
     """Return arrays for ``rows`` leaves over ``free`` coordinates."""
@@ -59,11 +49,6 @@ def empty(rows: int, free: int) -> Leaves:
         np.zeros((rows, free)), np.zeros((rows, free)), np.zeros(rows, np.uint8), np.zeros(rows),
         np.full((rows, COMBINED), -1, np.int64), np.zeros((rows, COMBINED)), np.zeros((rows, COMBINED)),
     )  # fmt: skip
-
-
-def joined(parts: list[Leaves]) -> Leaves:
-    """Return the rows of all tables as one."""
-    return Leaves(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 class Explored(NamedTuple):
@@ -105,7 +90,7 @@ class RoundUnit:
 
     def __call__(self, number: int, should_stop: Callable[[], bool]) -> tuple[int, int]:
         """Return the number of the unit and of the boxes it evaluated."""
-        mine = self.boxes.taken(np.arange(number, len(self.boxes.bound), UNITS))
+        mine = only(self.boxes, np.arange(number, len(self.boxes.bound), UNITS))
         if should_stop() or not len(mine.bound):
             return number, 0
         space, provable = self.question, self.question.provable
@@ -116,7 +101,7 @@ class RoundUnit:
         provable.explore(for_kernel, (*search, 0), tuple(leaves))  # evaluates no box, but compiles the kernels
         begin = time.thread_time()
         filled, judged = provable.explore(for_kernel, (*search, self.most), tuple(leaves))
-        _write(self.path(number), leaves.taken(np.arange(filled)), judged, time.thread_time() - begin)
+        _write(self.path(number), only(leaves, np.arange(filled)), judged, time.thread_time() - begin)
         return number, judged
 
 
@@ -162,7 +147,7 @@ def explored(
         if not len(todo.bound):
             break
         if cores.stop or (settings.seconds is not None and time.monotonic() - begin > settings.seconds):
-            return Explored(joined([*done, todo]), judged, True, seconds)
+            return Explored(joined(*done, todo), judged, True, seconds)
         most = max(int(settings.boxes * share) // UNITS, 1)
         unit = RoundUnit(question, target, _split(todo, question), most, settings.smallest, folder, number)
         counts = [_read(path).judged for path in _finished(unit)]  # of a stopped run
@@ -174,15 +159,15 @@ def explored(
             further = int(settings.boxes * sum(SHARES[number + 1 :])) if max(counts) == most else 0
             tell(judged + step, judged + step * UNITS // len(counts) + further)
         if cores.stop:
-            return Explored(joined([*done, todo]), judged, True, seconds)
+            return Explored(joined(*done, todo), judged, True, seconds)
         results = [_read(path) for path in _finished(unit)]
         judged += sum(result.judged for result in results)
         seconds += sum(result.seconds for result in results)
-        leaves = joined([result.leaves for result in results])
-        done.append(leaves.taken(~leaves.open))
-        todo = leaves.taken(leaves.open)
-        todo = todo.taken(np.lexsort((*todo.low.T, todo.bound)))
-    return Explored(joined([*done, todo]), judged, False, seconds)
+        leaves = joined(*(result.leaves for result in results))
+        done.append(only(leaves, leaves.outcome != OPEN))
+        todo = only(leaves, leaves.outcome == OPEN)
+        todo = only(todo, np.lexsort((*todo.low.T, todo.bound)))
+    return Explored(joined(*done, todo), judged, False, seconds)
 
 
 def _split(boxes: Leaves, question: Question) -> Leaves:
@@ -193,10 +178,10 @@ def _split(boxes: Leaves, question: Question) -> Leaves:
         widest = np.argmax((high - low) / sides, axis=1)
         rows = np.arange(len(low))
         middle = 0.5 * (low[rows, widest] + high[rows, widest])
-        first, second = boxes.taken(rows), boxes.taken(rows)
+        first, second = only(boxes, rows), only(boxes, rows)
         first.high[rows, widest] = middle
         second.low[rows, widest] = middle
-        boxes = joined([first, second])
+        boxes = joined(first, second)
     return boxes
 
 

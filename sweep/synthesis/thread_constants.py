@@ -83,6 +83,8 @@ def fit_contour(table: Table, confidence: float = 0.95) -> ConstantsFit:
     InputError
         for a bad table, or fewer measurements than constants.
     """
+    from scipy.special import exprel, hyp1f1
+
     given = columns_of(_MEASURED, table)
     t1, t2, radius, theta = (given[name] for name in ("T1", "T2", "R", "theta_deg"))
     pressed = 1.0 / (radius + 1.0 / np.sqrt(np.pi * given["gamma"] * given["N"])) ** 2
@@ -90,15 +92,16 @@ def fit_contour(table: Table, confidence: float = 0.95) -> ConstantsFit:
     def law(x: Array) -> Array:
         alpha, beta, b = x
         power = beta * theta
-        model: Array = t1 * np.exp(power) + b * pressed * np.expm1(power) + alpha * radius * theta * _growth(power)
+        model: Array = t1 * np.exp(power) + b * pressed * np.expm1(power) + alpha * radius * theta * exprel(power)
         return model / t2 - 1.0
 
     def slopes(x: Array) -> Array:
         alpha, beta, b = x
         power = beta * theta
         rise = theta * np.exp(power)
-        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * _growth_slope(power)
-        columns = (radius * theta * _growth(power), by_beta, pressed * np.expm1(power))
+        growth_slope = 0.5 * hyp1f1(2.0, 3.0, power)  # the derivative of exprel, (e^x - 1)/x
+        by_beta = t1 * rise + b * pressed * rise + alpha * radius * theta * theta * growth_slope
+        columns = (radius * theta * exprel(power), by_beta, pressed * np.expm1(power))
         return np.column_stack([column / t2 for column in columns])
 
     start = np.array([float(p.default or 0.0) for p in (ALPHA, BETA, BENDING)])
@@ -135,19 +138,6 @@ def fit_speed(table: Table, confidence: float = 0.95) -> ConstantsFit:
         return np.column_stack([np.expm1(x[1] * relative) / measured, x[0] * relative * power / measured])
 
     return _fitted(SPEED, law, slopes, np.array([0.4, 0.2]), len(measured), np.array([1.0, np.inf]), confidence)
-
-
-def _growth(x: Array) -> Array:
-    """Return (e^x - 1)/x."""
-    return np.where(x > 0.0, np.expm1(x) / np.where(x > 0.0, x, 1.0), 1.0)
-
-
-def _growth_slope(x: Array) -> Array:
-    """Return the derivative of (e^x - 1)/x, as a series for small x, where the quotient suffers cancellation."""
-    small = x < 0.05
-    safe = np.where(small, 1.0, x)
-    series = 0.5 + x * (1.0 / 3.0 + x * (1.0 / 8.0 + x * (1.0 / 30.0 + x * (1.0 / 144.0 + x / 840.0))))
-    return np.where(small, series, (np.exp(safe) * (safe - 1.0) + 1.0) / (safe * safe))
 
 
 def _fitted(

@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from sweep.families.base import Array
-from sweep.numerics.records import Indices, Mask
+from sweep.numerics.records import Indices, joined, only
 from sweep.optimise.problem.statement import Problem
 
 ShouldStop = Callable[[], bool]
@@ -29,15 +29,11 @@ class Members(NamedTuple):
     merit: Array
     designs: Array
 
-    def at(self, rows: Indices | Mask | list[int] | slice) -> Members:
-        """Return some of the members."""
-        return Members(self.places[rows], self.kinds[rows], self.merit[rows], self.designs[rows])
-
     @property
     def ranked(self) -> Members:
         """The members that have a value, the best first."""
         order = np.argsort(self.merit, kind="stable")
-        return self.at(order[np.isfinite(self.merit[order])])
+        return only(self, order[np.isfinite(self.merit[order])])
 
 
 class Landscape(Protocol):
@@ -108,16 +104,11 @@ def best_tries(landscape: Landscape, tries: Array, kinds: Indices) -> Members:
     """Return the best of the tries (k, t, n) of each child, of kinds (k,)."""
     count = tries.shape[1]
     valued = _valued(landscape, tries.reshape(-1, tries.shape[2]), np.repeat(kinds, count))
-    return valued.at(np.arange(len(tries)) * count + np.argmin(valued.merit.reshape(-1, count), axis=1))
+    return only(valued, np.arange(len(tries)) * count + np.argmin(valued.merit.reshape(-1, count), axis=1))
 
 
 def _valued(landscape: Landscape, places: Array, kinds: Indices) -> Members:
     return Members(places, kinds, landscape.values(places, kinds), places[:, :0])
-
-
-def joined(*parts: Members) -> Members:
-    """Return the members of all parts."""
-    return Members(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def diverse(problem: Problem, designs: Array, merit: Array, count: int, least: float = 0.0) -> Array:

@@ -17,7 +17,7 @@ from kernels.descent.descents import LOCKED
 from sweep.errors import InputError
 from sweep.families.base import Array
 from sweep.jobs.progress import Say, best_words, unsaid
-from sweep.numerics.records import Indices
+from sweep.numerics.records import Indices, joined, only
 from sweep.optimise.local.kkt import AGREE
 from sweep.optimise.multistart.survey import StartGroup
 from sweep.optimise.problem.statement import Problem
@@ -28,11 +28,10 @@ from sweep.optimise.starts.populations import (
     ShouldStop,
     best_tries,
     diverse,
-    joined,
     population,
     populations,
     spread,
-)  # fmt: skip
+)
 from sweep.optimise.starts.pose_rows import Descents, PoseRows
 from sweep.optimise.starts.ranked import ALIKE
 from sweep.study import OptimiseSettings, Study, Tolerance
@@ -95,14 +94,14 @@ class Proportions:
 
     def first(self, sample: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return the ends of descents from diverse good members of each class of swings."""
-        turning = sample.at(sample.merit < LOCKED).ranked
-        better = turning.at(slice(len(turning.merit) // 4))
+        turning = only(sample, sample.merit < LOCKED).ranked
+        better = only(turning, slice(len(turning.merit) // 4))
         groups, selected = self._groups(turning, better), list[int]()
         for k in range(self.sign_count * CLASSES):
             rows = np.flatnonzero(groups == k)
             count = -(-self.size.first // (self.sign_count * CLASSES))
             selected += rows[spread(turning.places[rows], turning.kinds[rows], count)].tolist()
-        return self._descended(turning.at(sorted(selected)), better, stop)
+        return self._descended(only(turning, sorted(selected)), better, stop)
 
     def children(self, parents: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
         """Return the ends of descents from children, each the best of many tries."""
@@ -123,7 +122,7 @@ class Proportions:
         runs.advance(self.size.steps - self.size.first_steps, stop)
         designs = within_turn(rows.linear.problem, rows.finished(runs.places, runs.kinds, runs.x))
         ends = Members(rows.with_middle(runs.places, runs.kinds), runs.kinds, runs.merit, designs)
-        return ends.at(runs.merit < LOCKED)
+        return only(ends, runs.merit < LOCKED)
 
     def _groups(self, members: Members | Descents, reference: Members) -> Indices:
         """Return the number of each member's kind and class among the swings of a ``reference``."""
@@ -177,7 +176,7 @@ class Proportions:
         guides for large swings would displace guides for small ones.
         """
         useful = members.ranked
-        useful = useful.at(useful.merit < USEFUL * useful.merit[:1])
+        useful = only(useful, useful.merit < USEFUL * useful.merit[:1])
         guides = useful.places[:, ~self.rows.driving]
         distance = NICHE * math.sqrt(guides.shape[1] / 6.0)
         taken, in_class = list[int](), Counter[int]()
@@ -189,7 +188,7 @@ class Proportions:
             if few and not (equal | near).any():
                 in_class[group] += 1
                 taken.append(k)
-        return useful.at(taken)
+        return only(useful, taken)
 
 
 def _classes(swings: Array, reference: Array) -> Indices:

@@ -13,7 +13,7 @@ import numpy as np
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Accuracy, Array
 from sweep.families.names import is_flag, stem
-from sweep.numerics.records import Indices
+from sweep.numerics.records import Indices, only
 from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup
 from sweep.optimise.problem.program import violation_scale
 from sweep.optimise.problem.statement import Problem
@@ -96,16 +96,16 @@ class Ranked:
         ranked, best = sample.ranked, KEPT * self.ends
         feasible = int(np.searchsorted(ranked.merit, OUTSIDE))
         rows = np.r_[: min(feasible, best), feasible : min(feasible + best, len(ranked.merit))]
-        ranked = self._verified(ranked.at(rows)).ranked
+        ranked = self._verified(only(ranked, rows)).ranked
         feasible, turning = np.searchsorted(ranked.merit, (OUTSIDE, NOT_TURNING)).tolist()
         taken = np.array(spread(ranked.places[:feasible], ranked.kinds[:feasible], self.parents // 2), np.intp)
         feasible_count = len(taken)
         for candidates in (np.arange(feasible, turning), np.arange(len(ranked.merit))):
             rows = np.concatenate([taken, candidates[~np.isin(candidates, taken)]])
             taken = rows[spread(ranked.places[rows], ranked.kinds[rows], self.parents, first=len(taken))]
-        members = self.children(ranked.at(taken), rng, stop)
+        members = self.children(only(ranked, taken), rng, stop)
         if feasible_count >= self.ends:  # designs moved within the limits have to be as good as those that were there
-            members = members.at(members.merit <= members.merit[:feasible_count].max())
+            members = only(members, members.merit <= members.merit[:feasible_count].max())
         return members
 
     def children(self, parents: Members, rng: np.random.Generator, stop: ShouldStop) -> Members:
@@ -134,7 +134,7 @@ class Ranked:
     def diverse(self, members: Members, count: int) -> Members:
         """Return the best members that keep a distance from each other."""
         ranked = members.ranked
-        return ranked.at(spread(ranked.places, ranked.kinds, count))
+        return only(ranked, spread(ranked.places, ranked.kinds, count))
 
 
 def _drawn_within(problem: Problem, fractions: Array) -> Array:
