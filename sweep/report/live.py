@@ -64,6 +64,7 @@ def embedded(values: dict[str, Any]) -> str:
 
 
 FAR_LIMIT = 2.5  # limits farther out than this multiple of the curves are not drawn, since the curves would look flat
+ROUNDING = 1e-11  # angle [rad] below which a curve shows rounding errors only: it is drawn as 0
 
 
 def in_window(path: Array, window: tuple[float, float]) -> NDArray[np.bool_]:
@@ -203,6 +204,8 @@ def _panel(data: Dataset, name: str, motions: list[Motion]) -> dict[str, Any]:
     most = FAR_LIMIT * max(abs(low), abs(high))
     lines = [value for value in limit_values(name, data.study.limits) if abs(value) <= most]
     low, high = min([low, *lines]), max([high, *lines])
+    if shown.unit == "°" and max(abs(low), abs(high)) < ROUNDING:
+        low = high = 0.0
     if windowed:
         high = AROUND * max(abs(low), abs(high))
         low = -high

@@ -61,6 +61,12 @@ class Histogram:
         low, high = (-math.inf if self.low is None else self.low), (math.inf if self.high is None else self.high)
         return (middle < low) | (middle > high)
 
+    @property
+    def digits(self) -> int:
+        """Number of significant digits by which its ends differ, three at least."""
+        low, high = float(self.edges[0]), float(self.edges[-1])
+        return 3 + max(0, math.floor(math.log10(max(abs(low), abs(high)) / (high - low))))
+
 
 class YieldSummary(NamedTuple):
     """Yield of the result, histogram of the limit missed most, and cost of the dimensions' tolerances."""

@@ -86,6 +86,20 @@ def test_design_moves_as_its_joints_and_curves_do(four_bars):
     assert found["curves"][0]["title"] == "follower angle ψ, from its lowest"
 
 
+def test_curve_of_rounding_errors_is_drawn_as_zero(tmp_path):
+    """The force of a slotted lever in line has no pressure angle; its poses have some 1e-16 rad."""
+    study = {
+        "study": {"name": "lever"},
+        "mechanism": {"family": "inverted_slider_crank"},
+        "scene": {"want": ["swing"]},
+        "design": {"a": "39.47 mm", "e": {"from": 150.0, "to": 152.4, "count": 2, "unit": "mm"}, "h": "1e-13 mm"},
+        "objective": {"minimise": "max_abs_d2psi"},
+    }
+    data, *_ = gather(sweep.run(study_from_data(study, "study.toml"), out=tmp_path / "designs", jobs=1))
+    panels = {curve["name"]: curve for curve in moving(data, shown_designs(data, groups(data)))["curves"]}
+    assert panels["pressure_angle"]["range"] == [0.0, 0.0] and panels["d2psi"]["range"][1] > 0.1
+
+
 def test_lines_are_designs_of_the_dataset_the_best_among_them(four_bars):
     data, _, cells = gather(four_bars)
     rows = sweep.load(four_bars)

@@ -25,6 +25,7 @@ from sweep.report.dataset import without_rows
 from sweep.report.figures import LIMIT
 from sweep.report.made import TELLING_GAIN, histogram, made, made_sentence
 from sweep.report.optima import groups, optima, optima_sentence, shown_designs
+from sweep.report.quantities import number
 from sweep.study import study_from_data
 
 DATA = {
@@ -174,6 +175,8 @@ def test_histogram_marks_what_misses_the_limit() -> None:
     assert below == [x < 11.99 for x in middle] == found.missing.tolist() and 5 < sum(below) < len(below) - 5
     assert sum(bar.get_height() for bar in axes.patches) == pytest.approx(100.0, abs=1e-9)
     assert [line.get_xdata()[0] for line in axes.lines] == [pytest.approx(11.99)]
+    ends = [float(number(end, found.digits)) for end in found.edges[[0, -1]]]
+    assert ends == pytest.approx(found.edges[[0, -1]], abs=0.01 * np.ptp(found.edges)), "11.9 would stand at 11.94"
 
 
 def test_histogram_of_a_mechanism_that_only_has_to_turn_is_that_of_its_margin() -> None:
