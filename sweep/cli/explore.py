@@ -10,10 +10,12 @@ import click
 from sweep.cli.families import family_names
 from sweep.cli.first_study import study_text
 from sweep.dataset.files import PLAN, beside, located
+from sweep.engine.estimate import compiling
 from sweep.errors import InputError
 from sweep.explore.hand import Hand, of_results, of_study
 from sweep.explore.server import Server
 from sweep.families import family
+from sweep.jobs.progress import Phases
 from sweep.study import load_study
 from sweep.study.load import study_from_data
 
@@ -31,7 +33,8 @@ def explore(source: str, port: int, opened: bool) -> None:
     """
     hand = in_hand(source)
     server = Server(hand, port)
-    hand.answer([hand.first], [""])  # compiles the kernels for the page's first request
+    with Phases(show=True) as phases, compiling(phases):  # the kernels of the page's first request: up to half a minute
+        hand.answer([hand.first], [""])
     click.echo(f"explore: {server.address}\nCtrl-C ends it")
     if opened:
         click.launch(server.address)

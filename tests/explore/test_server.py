@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import time
 import tomllib
 from itertools import pairwise
 from urllib.error import HTTPError
@@ -12,8 +13,13 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
+from numba.core.event import trigger_event
 
 import sweep
+from sweep.cli.main import main
+from sweep.explore.hand import Hand
+from sweep.explore.server import Server
 from sweep.report.quantities import quantity
 from sweep.study import study_from_data
 from tests.explore.conftest import BARS
@@ -28,6 +34,23 @@ def refused(address, what="", content=None, **headers):
     with pytest.raises(HTTPError) as found:
         urlopen(Request(address + what, data, headers))
     return found.value.code, found.value.read().decode()
+
+
+def test_what_is_compiled_before_the_address_is_told(monkeypatch):
+    """A first page stood 15 seconds without a word."""
+
+    def compiled(*_):
+        for _ in range(2):
+            with trigger_event("numba:compile"):
+                pass
+            time.sleep(2.2)  # progress is told of what takes more than two seconds
+
+    monkeypatch.setattr(Hand, "answer", compiled)
+    monkeypatch.setattr(Server, "run", lambda server: server.socket.close())
+    said = CliRunner().invoke(main, ["explore", "slider_crank"])
+    assert (
+        said.exit_code == 0 and "compiling: 2 functions" in said.stderr and said.stdout.startswith("explore: http://")
+    )
 
 
 def test_numbers_are_those_of_summarise(address, study):
