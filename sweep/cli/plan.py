@@ -208,7 +208,7 @@ def _before_and_between(study: Study) -> list[str]:
 
 
 def _kept(cost: Estimate) -> str:
-    words = f"{cost.kept:.3g} of all designs"
+    words = f"{100.0 * cost.kept:.3g} % of all designs"
     return f"none of a pilot's designs, {words} assumed" if cost.kept <= LEAST_KEPT else words
 
 

@@ -141,6 +141,9 @@ def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[s
         if isinstance(before, Mapping) and isinstance(now, Mapping):
             lines += _lines(before, now, f"{name}.")
         else:
+            if isinstance(before, list) and isinstance(now, list) and len(before) == len(now) > MOST:
+                pairs = [pair for pair in zip(before, now, strict=True) if pair[0] != pair[1]]
+                before, now = [x for x, _ in pairs], [x for _, x in pairs]
             unit_before, unit = (None, None) if key in WITHOUT_UNIT else units
             unit_before = unit_before if unit_before != unit else None
             lines.append(f"{name} {_written(before, unit_before)} -> {_written(now, unit)}")

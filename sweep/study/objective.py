@@ -9,7 +9,7 @@ from typing import Any, Literal, cast
 from sweep.errors import InputError
 from sweep.families.base import Family, Output, Parameter, Unit
 from sweep.families.chain import driven_guide
-from sweep.families.names import negative, without_minus
+from sweep.families.names import is_flag, negative, without_minus
 from sweep.quantities.limits import Limit
 from sweep.quantities.measures import measure
 from sweep.quantities.resolve import output
@@ -70,7 +70,8 @@ def check_steady(file: StudyFile, family: Family, objective: ObjectiveSection, l
     checked += [(("limits", limit.output), limit.output, written.get(limit.output, limit.output)) for limit in limits]
     for key, name, given in checked:
         with suppress(InputError):  # an unknown name is reported where it stands
-            if name not in family.parameter_names and output(family, name).jumps:
+            flag = key[0] == "objective" and is_flag(name)
+            if flag or (name not in family.parameter_names and output(family, name).jumps):
                 allowed = (
                     f"a quantity that changes steadily; {name} is constant in pieces, so no slope leads to it: ask for "
                     "it in scene.want, or leave out [optimise] and let the sweep alone decide"

@@ -38,6 +38,7 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
         ({}, {"limits": {"swing": {"max": 9.5, "unit": "deg"}}}, ["limits none -> swing = max = 9.5 deg"]),
         ({"design": {"a": {"values": [1, 2], "unit": "mm"}}}, {"design": {"a": {"values": [1, 3], "unit": "mm"}}},
          ["design.a.values 1, 2 -> 1, 3 mm"]),
+        ({"scene": {"want": list("abcdefgh")}}, {"scene": {"want": list("abxdefgy")}}, ["scene.want c, h -> x, y"]),
         ({"design": {"a": {"value": 2, "unit": "mm"}}}, {"design": {"a": {"value": 2, "unit": "in"}}},
          ["design.a.unit mm -> in"]),
         ({"design": {"a": {"from": 1, "to": 9, "count": 3, "unit": "mm"}}},

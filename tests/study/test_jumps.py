@@ -56,6 +56,8 @@ def test_count_that_is_wanted_beside_an_optimiser_is_computed_without_slopes(tmp
     [
         (('"max_abs_d2psi"', '"pressure_extrema"'), "objective.minimise = 'pressure_extrema'"),
         (('minimise = "max_abs_d2psi"', 'maximise = "pressure_extrema"'), "objective.maximise = 'pressure_extrema'"),
+        (('"max_abs_d2psi"', '"rotatable"'), "objective.minimise = 'rotatable'"),
+        (('minimise = "max_abs_d2psi"', 'maximise = "rotatable"'), "objective.maximise = 'rotatable'"),
         (('swing = ">= 20 deg"', 'pressure_extrema = "<= 2"'), "limits.pressure_extrema = '<= 2'"),
     ],
 )
