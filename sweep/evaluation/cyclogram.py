@@ -21,7 +21,7 @@ from sweep.families.capabilities import PresserFoot
 from sweep.families.machines.crossings import SAMPLES, Moment, Poses
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.pressing import Pressing
-from sweep.numerics.events import zeros
+from sweep.numerics.events import beyond, zeros
 from sweep.quantities.resolve import event_names
 
 if TYPE_CHECKING:
@@ -117,8 +117,7 @@ def _strokes(poses: Poses, family: Family, member: str, name: str, dwell: float)
     for word, level in (("low", float(exact.min())), ("high", float(exact.max()))):
 
         def beyond_band(phi: float, level: float = level) -> float:
-            offset = poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0][0] - level
-            return float(abs(offset - TWO_PI * round(offset / TWO_PI) if wraps else offset)) - band
+            return float(abs(beyond(poses.at(np.zeros(1, np.intp), np.array([phi]), name)[0], level, wraps)[0])) - band
 
         found: list[tuple[float, float]] = []
         for phi in extrema[np.abs(exact - level) <= LEVEL * most]:  # a geared member is there several times a turn

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels.types import TWO_PI, Array
-from sweep.numerics.records import Indices
+from sweep.numerics.records import Indices, Mask
 
 WIDER = 8.0  # ratio of successive distances: a pole beside the nearer end leaves 2.1^-k in the k-th coefficient
 SHORTEST = 1e-11  # distance of a zero [rad] below which its effect falls between two crank angles
@@ -20,6 +20,25 @@ FLAT = 1e-9  # width of brackets [rad] in which a smooth function is at its mini
 
 Functions: TypeAlias = Callable[[Indices, Array], Array]
 """``f(rows, phi)``: values (k, m, q) of q functions of the designs ``rows`` (k,) at crank angles (k, m)."""
+
+
+def beyond(values: Array, level: Array | float, wraps: bool) -> Array:
+    """Return how far values lie beyond a level; of an angle that ``wraps`` in (-pi, pi], modulo full turns."""
+    off: Array = values - level
+    return off - TWO_PI * np.round(off / TWO_PI) if wraps else off
+
+
+def passages(off: Array, wraps: bool) -> Mask:
+    """Mark after which samples (n, m) rise through 0; an angle that ``wraps`` does not where it leaps to -pi."""
+    after = np.roll(off, -1, axis=1)
+    passes: Mask = (off < 0.0) & (after >= 0.0)
+    return passes & (after - off < np.pi) if wraps else passes
+
+
+def first_passage(passes: Mask, off: Array) -> Indices:
+    """Find the sample before the first passage of each row, (n,): the last sample where sample 0 itself is at 0."""
+    last: Indices = np.where(passes[:, -1] & (off[:, 0] == 0.0), off.shape[1] - 1, passes.argmax(axis=1))
+    return last
 
 
 def sign_changes(functions: Functions, angles: Array, jumps: Array | None = None) -> tuple[Indices, Array]:

@@ -11,7 +11,7 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Event, Family, Interval
 from sweep.families.names import error_of
-from sweep.numerics.events import zeros
+from sweep.numerics.events import beyond, first_passage, passages, zeros
 from sweep.numerics.records import Indices
 from sweep.quantities.resolve import event_names
 from sweep.reductions.resolution import denser
@@ -69,10 +69,10 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
             columns, worst, _ = sample_turn(family, designs[rows], samples, [event.of])
             status[rows] = DESIGN_STATUS[worst]
             good = status[rows] == st.OK
-            rows, values = rows[good], np.ascontiguousarray(columns[event.of][good])
+            rows, values = rows[good], np.ascontiguousarray(_beyond(family, event, columns[event.of][good]))
             number[rows], phi[rows], err[rows] = _crossings(family, designs, rows, values, event)
             unsure = np.zeros(rows.size, np.bool_)
-            scan.grazes(values, np.full(rows.size, event.level), unsure)
+            scan.grazes(values, np.zeros(rows.size), unsure)
             doubtful[rows] = unsure
         pending = doubtful | (pending & (fewest > samples))
         samples *= 2
@@ -84,19 +84,26 @@ def _events(family: Family, designs: Array, event: Event, accuracy: Accuracy) ->
     return phi, err, number, status
 
 
+def _beyond(family: Family, event: Event, values: Array) -> Array:
+    return beyond(values, event.level, family.pose_output[event.of].wraps)
+
+
 def _crossings(
     family: Family, designs: Array, rows: Indices, values: Array, event: Event
 ) -> tuple[Array, Array, Array]:
-    """Count the passages of samples (r, m) in the event's sense; also the first place and its error, each (r,)."""
-    off = (values - event.level) * (1.0 if event.rising else -1.0)
-    passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
+    """Count the passages in the event's sense; also the first place and its error, each (r,).
+
+    ``values`` (r, m) are samples of how far the output lies beyond the event's level.
+    """
+    off = values * (1.0 if event.rising else -1.0)
+    passes = passages(off, family.pose_output[event.of].wraps)
     if isinstance(family.domain, Interval):
         passes[:, values.shape[1] // 2 :] = False  # the way back is not counted
     number = passes.sum(axis=1).astype(np.float64)
     phi, err = np.full(rows.size, np.nan), np.full(rows.size, np.nan)
     row = np.flatnonzero(number > 0)
     if row.size:
-        column = passes[row].argmax(axis=1)
+        column = first_passage(passes[row], off[row])
         step = TWO_PI / values.shape[1]
         ends = off[row, column], off[row, (column + 1) % values.shape[1]]
         phi[row], err[row] = _root(family, designs[rows[row]], event, column * step, (column + 1) * step, *ends)
@@ -109,7 +116,7 @@ def _root(
     """Find a root between two samples with the values ``low`` and ``high``, from whose slope its error follows."""
 
     def off(which: Indices, phi: Array) -> Array:
-        return pose_columns(family, designs[which], phi[:, None], [event.of])[0][event.of][:, 0] - event.level
+        return _beyond(family, event, pose_columns(family, designs[which], phi[:, None], [event.of])[0][event.of])[:, 0]
 
     slope = np.abs((high - low) / (right - left))
     phi = zeros(off, left, right)

@@ -9,7 +9,7 @@ import numpy as np
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Array, Family
-from sweep.numerics.events import zeros
+from sweep.numerics.events import beyond, zeros
 from sweep.numerics.records import Indices, Mask, joined, only
 from sweep.quantities.kinds import Request
 from sweep.reductions.refine import Peaks
@@ -93,8 +93,7 @@ def edges(family: Family, designs: Array, rows: Indices, window: Window, columns
 
     def at(which: Indices, phi: Array, of: Family = family) -> tuple[Array, Array]:
         poses, _ = pose_columns(of, designs[rows[row[which]]], phi, (window.position, pose))
-        off = poses[window.position] - level[which, None]
-        return poses[pose], off - TWO_PI * np.round(off / TWO_PI) if wraps else off
+        return poses[pose], beyond(poses[window.position], level[which, None], wraps)
 
     every = np.arange(row.size)
     phi = zeros(lambda which, place: at(which, place[:, None])[1][:, 0], column * spacing, (column + 1) * spacing)

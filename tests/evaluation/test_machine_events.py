@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import sweep
+from kernels import status as st
 from sweep.errors import StudyError
 from sweep.study import load_study, study_from_data
 from tests.evaluation.test_machines import LOOPER, TABLE, two
@@ -63,6 +64,32 @@ def test_event_is_where_a_dense_grid_passes_the_level(event: str, output: str, l
     assert found[f"phi_{event}"][0] == pytest.approx(places[0], abs=1e-6)
     at = sweep.evaluate(machine, TABLE, [output], phi=[found[f"phi_{event}"][0]])[output][0]
     assert at == pytest.approx(level, abs=1e-11)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0, 3.0, 4.0])
+@pytest.mark.parametrize("ratio", [1, 2, -1])
+def test_follower_that_turns_fully_passes_a_level_once_a_turn_and_never_back(level: float, ratio: int) -> None:
+    """Its angle leaps by a full turn: that was a passage against its sense, at the sample before the leap."""
+    k, a = 0.5, 0.2
+    p, q = (a + mp.mpf(k)) / 2, (a - mp.mpf(k)) / 2
+    on = mp.findroot(lambda al: al - mp.atan2(p * mp.sin(al), 1 + q * mp.cos(al)) - level, level)
+    first = float(mp.fmod(on / ratio + 2 * mp.pi, 2 * mp.pi))
+    events = {name: {"event": "n.psi", "level": level, "rising": name == "up"} for name in ("up", "down")}
+    machine = sweep.machine({"n": {"family": "geared_dwell", "ratio": ratio}}, events)
+    with_, against = ("up", "down") if ratio > 0 else ("down", "up")
+    found = sweep.summarise(machine, {"n.k": k, "n.a": a}, [f"phi_{with_}", f"count_{with_}"]).iloc[0]
+    assert found["status"] == st.OK and found[f"count_{with_}"] == abs(ratio)
+    # mpmath's root is good to 15 digits of a double, as level and k are.
+    assert abs(found[f"phi_{with_}"] - first) <= found[f"err_phi_{with_}"] + 1e-15 * (1.0 + first)
+    never = sweep.summarise(machine, {"n.k": k, "n.a": a}, [f"phi_{against}"]).iloc[0]
+    assert never["status"] == st.NO_EVENT and np.isnan(never[f"phi_{against}"])
+
+
+def test_passage_at_the_start_of_the_turn_is_the_first_one() -> None:
+    """A pin twice as fast rises through 0 at 0 and at pi: the one at 0 was taken for the last one."""
+    machine = sweep.machine({"n": {"family": "slider_crank", "ratio": 2}}, {"up": {"event": "n.y_b"}})
+    found = sweep.summarise(machine, {"n.a": 1.0, "n.b": 3.0, "n.e": 0.0}, ["phi_up", "count_up"]).iloc[0]
+    assert found["phi_up"] == 0.0 and found["count_up"] == 2
 
 
 def test_residence_below_a_level_is_the_timing_of_two_events() -> None:

@@ -19,7 +19,7 @@ from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 from sweep.families.machines.relations import Relation
-from sweep.numerics.events import bottoms, zeros
+from sweep.numerics.events import beyond, bottoms, first_passage, passages, zeros
 from sweep.numerics.records import Indices, Mask, only
 
 if TYPE_CHECKING:
@@ -216,14 +216,15 @@ class Poses:
         Designs whose samples may touch the level between two of them are sampled twice as densely, as for events alone.
         """
         status, (values,) = self.samples([name], count)
-        off = sense * (values - level)
-        passes = (off < 0.0) & (np.roll(off, -1, axis=1) >= 0.0)
+        wraps = self.quick.pose_output[name].wraps
+        off = beyond(values, level, wraps)
+        passes = passages(sense * off, wraps)
         row = np.flatnonzero(passes.any(axis=1))
-        start = passes[row].argmax(axis=1) * (TWO_PI / count)
-        found = scattered(len(off), row, self._root(row, start, start + TWO_PI / count, name, values, level))
+        start = first_passage(passes[row], off[row]) * np.float64(TWO_PI / count)
+        found = scattered(len(off), row, self._root(row, start, start + TWO_PI / count, name, off, level))
         status = np.where((status == st.OK) & np.isnan(found), st.NO_EVENT, status).astype(np.uint8)
         touching = np.zeros(len(off), np.bool_)
-        scan.grazes(values, np.full(len(off), level), touching)
+        scan.grazes(off, np.zeros(len(off)), touching)
         row = np.flatnonzero(touching)
         if row.size and count < MOST:
             denser = Poses(self.quick, self.precise, self.designs[row])
@@ -232,29 +233,31 @@ class Poses:
             status[row] = st.NOT_CONVERGED
         return status, found
 
-    def _root(self, row: Indices, left: Array, right: Array, name: str, values: Array, level: float = 0.0) -> Array:
+    def _root(self, row: Indices, left: Array, right: Array, name: str, off: Array, level: float = 0.0) -> Array:
         """Find a root in each bracket where an output passes a level.
 
-        It is computed on polynomials through samples (n, m), then corrected by one step on poses; where that step is
-        not small, the polynomial is inaccurate and the root is found on poses alone.
+        It is computed on polynomials through samples (n, m) of how far it lies beyond, then corrected by one step on
+        poses; where that step is not small, the polynomial is inaccurate and the root is found on poses alone.
         """
         if not row.size:
             return np.zeros(0)
-        step = TWO_PI / values.shape[1]
+        step, wraps = TWO_PI / off.shape[1], self.quick.pose_output[name].wraps
         column = np.floor(0.5 * (left + right) / step).astype(np.intp)
-        near = values[row[:, None], (column[:, None] + np.arange(-2, 4)) % values.shape[1]] - level
+        near = off[row[:, None], (column[:, None] + np.arange(-2, 4)) % off.shape[1]]
         polynomial = np.linalg.solve(np.vander(np.arange(-2.0, 4.0), increasing=True), near.T)
         on_samples: Any = lambda k, t: polyval(t, polynomial[:, k], tensor=False)  # noqa: E731
         t = zeros(on_samples, left / step - column, right / step - column)
         guess: Array = (column + t) * step
-        height = self.near(row, guess, name) - level
+        height = beyond(self.near(row, guess, name), level, wraps)
         with np.errstate(divide="ignore", invalid="ignore"):
             better = guess - height * step / polyval(t, polyder(polynomial), tensor=False)
         close = (np.abs(better - guess) <= NEAR * step) & (better >= left) & (better <= right)
         rest = np.flatnonzero(~close)
         if rest.size:
             some = row[rest]
-            better[rest] = zeros(lambda k, phi: self.near(some[k], phi, name) - level, left[rest], right[rest])
+            better[rest] = zeros(
+                lambda k, phi: beyond(self.near(some[k], phi, name), level, wraps), left[rest], right[rest]
+            )
         return np.asarray(better, np.float64)
 
     def least(self, row: Indices, start: Array, end: Array, name: str, samples: int = 64) -> Array:
