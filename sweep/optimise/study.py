@@ -36,7 +36,7 @@ from sweep.optimise.multistart.survey import CUT, Survey, survey_of
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.posing import problem_and_starts, problem_of, problem_of_dataset
-from sweep.optimise.starts.proportions import insensitive
+from sweep.optimise.starts.proportions import enclosing, insensitive
 from sweep.study import Limit, Study
 
 COLUMNS = Path(__file__).parents[1] / "columns.toml"
@@ -156,12 +156,11 @@ def optimise_study(
     if study.tolerance is not None and study.tolerance.robust is not None and settings and survey.ended not in CUT:
         unhurried = replace(settings, time_budget=None)  # one deadline for all following steps
         stored = kept.parts.get("insensitive")
-        stored_designs = None if stored is None else np.array(stored).reshape(-1, len(problem.family.parameters))
-        robust_problem, robust_starts = insensitive(study, unhurried, problem, deadline, jobs, say, stored_designs)
+        robust_starts = np.array(stored) if stored else insensitive(study, unhurried, problem, deadline, jobs, say)
         if not deadline():
             kept.note("insensitive", robust_starts.tolist())
         robust_result = robust(
-            robust_problem, results, study.tolerance, unhurried, deadline, jobs, robust_starts,
+            enclosing(study, problem, robust_starts), results, study.tolerance, unhurried, deadline, jobs, robust_starts,
             lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
         if robust_result is not None:

@@ -261,28 +261,23 @@ def insensitive(
     stop: ShouldStop,
     jobs: int,
     say: Say = unsaid,
-    designs_found: Array | None = None,
-) -> tuple[Problem, Array]:
+) -> Array:
     """Find designs that are good when manufactured: ends of populations whose descents include margins for tolerances.
 
     Returns
     -------
-    The problem with bounds that contain the designs, and the designs (k, P), the best first; none without a global
-    search.  With ``designs_found`` before, no search takes place.
+    The designs (k, P), the best first; none without a global search.
     """
-    if designs_found is not None and len(designs_found):
-        return enclosing(study, problem, designs_found), designs_found
     empty = np.empty((0, len(problem.family.parameters)))
     if not settings.by_populations:
-        return problem, empty
+        return empty
     landscape = Proportions(_elimination(study, problem, study.tolerance), kinds(study, problem, empty), jobs)
     designs, merit, phase = empty, np.empty(0), "tolerances"
     say(phase, 0, POPULATIONS, "populations")
     for number, members in enumerate(populations(landscape, POPULATIONS, settings.seed + OTHER_SEED, stop), 1):
         designs, merit = np.concatenate([designs, members.designs]), np.concatenate([merit, members.merit])
         say(phase, number, POPULATIONS, f"populations{best_words(merit.min(initial=math.inf))}")
-    designs_found = designs[_distinct_values(merit, [], ENDS)]
-    return enclosing(study, problem, designs_found), designs_found
+    return designs[_distinct_values(merit, [], ENDS)]
 
 
 def descend_once(study: Study, problem: Problem) -> None:
