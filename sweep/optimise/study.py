@@ -159,8 +159,9 @@ def optimise_study(
         robust_starts = np.array(stored) if stored else insensitive(study, unhurried, problem, deadline, jobs, say)
         if not deadline():
             kept.note("insensitive", robust_starts.tolist())
+        robust_problem = enclosing(study, problem, robust_starts)
         robust_result = robust(
-            enclosing(study, problem, robust_starts), results, study.tolerance, unhurried, deadline, jobs, robust_starts,
+            robust_problem, results, study.tolerance, unhurried, deadline, jobs, robust_starts,
             lambda done, total, best: say("robust design", done, total, f"searches {AT_MOST}{best}"), kept,
         )  # fmt: skip
         if robust_result is not None:

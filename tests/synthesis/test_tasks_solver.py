@@ -41,30 +41,25 @@ LOOPER = {"e": 35.0,
 class Chebyshev:
     """The cubic x^3 + p x + q that is least in magnitude on [-1, 1]: p = -3/4, q = 0, largest value 1/4."""
 
-    equations: tuple[str, ...] = ()
-    limits: tuple[str, ...] = ()
     objective: str = "largest value"
     unknowns: tuple[Unknown, ...] = (Unknown("p", -2.0, 2.0), Unknown("q", -1.0, 1.0))
 
     def evaluate(self, x):
         t = np.cos(np.linspace(0.0, np.pi, 721))[None, :]  # holds -1, -1/2, 1/2, 1
         curve = t**3 + x[:, [0]] * t + x[:, [1]]
-        none = np.empty((len(x), 0))
-        return Candidates(none, none, curve, {"p": x[:, 0]})
+        return Candidates({}, {}, curve, {"p": x[:, 0]})
 
 
 @dataclass(frozen=True)
 class OnACircle(Chebyshev):
     """The point of the unit circle, in the half plane y >= 1/2, nearest to (0.1, 0) by the larger coordinate."""
 
-    equations: tuple[str, ...] = ("circle",)
-    limits: tuple[str, ...] = ("half plane",)
     unknowns: tuple[Unknown, ...] = field(default=(Unknown("x", -2.0, 2.0), Unknown("y", -2.0, 2.0)))
     lowest: float = 0.5
 
     def evaluate(self, x):
-        circle = (x**2).sum(axis=1, keepdims=True) - 1.0
-        return Candidates(circle, x[:, [1]] - self.lowest, x - [0.1, 0.0], {"x": x[:, 0], "y": x[:, 1]})
+        circle, above = (x**2).sum(axis=1) - 1.0, x[:, 1] - self.lowest
+        return Candidates({"circle": circle}, {"half plane": above}, x - [0.1, 0.0], {"x": x[:, 0], "y": x[:, 1]})
 
 
 def test_minimax_with_kinks_is_found_to_rounding():

@@ -18,7 +18,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
-from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, turning
+from sweep.synthesis.tasks.problem import Candidates, SynthesisTask, Unknown, turning
 
 Number: TypeAlias = Array | float
 
@@ -150,7 +150,7 @@ class EngineeringMethod(LocusTask):
         low, high = self.f_range
         return (turning("phi1"),) if low == high else (turning("phi1"), Unknown("f", low, high))
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         designs, psi1 = self.drive(x["phi1"], x.get("f", self.f_range[0]))
         columns = named(designs)
@@ -161,7 +161,7 @@ class EngineeringMethod(LocusTask):
             curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
         limits = {"pressure angle": pressure_limit(designs, self.max_pressure_angle)}
         limits |= {"bearings": bearing_reserve(designs, self.bearings)} if self.bearings else {}
-        return NamedCandidates({}, limits, curve, columns)
+        return Candidates({}, limits, curve, columns)
 
     def offset_ranges(self, places: int = 180, offsets: int = 181) -> list[tuple[float, float]]:
         """Return the ranges of f in which some place of the locus satisfies all limits: step 3 of the method.
@@ -170,7 +170,8 @@ class EngineeringMethod(LocusTask):
         """
         f: Array = np.linspace(*self.f_range, offsets, dtype=np.float64)
         phi1: Array = np.arange(places, dtype=np.float64) * (2.0 * np.pi / places)
-        feasible = np.array([(self.evaluate(broadcast_columns(phi1, x)).limits >= 0.0).all(axis=1).any() for x in f])
+        slacks = (self.evaluate(broadcast_columns(phi1, x)).limits.values() for x in f)
+        feasible = np.array([(np.min([*limits], axis=0) >= 0.0).any() for limits in slacks])
         edges = np.flatnonzero(np.diff(np.concatenate([[False], feasible, [False]]).astype(np.int8)))
         return [(float(f[a]), float(f[b - 1])) for a, b in edges.reshape(-1, 2)]
 

@@ -22,7 +22,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     turn,
     with_tops,
 )
-from sweep.synthesis.tasks.problem import NamedCandidates, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import Candidates, Unknown, ranges, turning
 from sweep.synthesis.tasks.second_stage import RSSP, chain_motion, second_pressure_limit
 
 EXACT = Accuracy(target=1e-12)
@@ -87,7 +87,7 @@ class Task5(LocusTask):
         """Places of both stages on their loci."""
         return (turning("phi1"), *ranges(self, "f"), turning("t1"), *ranges(self, "ratio"))
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         phi1, t1, ones = x["phi1"], x["t1"], np.ones(len(x["phi1"]))
         designs, psi1 = self.drive(phi1, x["f"])
@@ -113,7 +113,7 @@ class Task5(LocusTask):
             "a2 positive": a2 / abs(self.rho0),
             "no return of the pin": np.minimum(sign * np.sin(t1), sign * np.sin(t2)),
         }
-        return NamedCandidates(
+        return Candidates(
             equations, limits, curve, named(designs, "1") | {"a2": a2, "e2": e2, "t1": t1, "kappa": self.kappa}
         )
 
@@ -161,7 +161,7 @@ class Task8(LocusTask):
         """Places on both loci."""
         return (turning("phi1"), *ranges(self, "f", "coupler", "offset"))
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         coupler, offset = x["coupler"], x["offset"]
         designs, psi1 = self.drive(x["phi1"], x["f"])
@@ -193,7 +193,7 @@ class Task8(LocusTask):
             # all steps of the slider have the direction of the whole stroke
             "no return of the slider": (np.diff(slide, axis=1) * np.sign(travel)[:, None]).min(axis=1),
         }
-        return NamedCandidates({}, limits, with_tops(d2s), columns | {"dwell_deviation": deviation})
+        return Candidates({}, limits, with_tops(d2s), columns | {"dwell_deviation": deviation})
 
     def _deviation(self, designs: Array, phi1: Array, psi1: Array, theta: Array, lengths: Array) -> Array:
         """Return the largest distance from the dwell position during the dwell."""

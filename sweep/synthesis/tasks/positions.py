@@ -24,7 +24,7 @@ from sweep.synthesis.tasks.crank_rocker import (
     named,
     pressure_limit,
 )
-from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import Candidates, SynthesisTask, Unknown, ranges, turning
 
 PLANAR = 1e-12  # |sin(alpha)| below which f has no influence
 
@@ -38,7 +38,7 @@ class Position(NamedTuple):
 
 def through_positions(
     task: Task1 | Task2, swing: Number, phi0: Number, phi1: Array, g: Number, alpha: Number, f: float = 0.0
-) -> NamedCandidates:
+) -> Candidates:
     """Return crank-rockers on the locus whose f puts them through the first position, with residuals of the others.
 
     Equation (15) of docs/synthesis.md.  With sin(alpha) = 0 the closure does not contain f: the given f is used and
@@ -74,7 +74,7 @@ def through_positions(
     limits = {"pressure angle": pressure_limit(designs, task.max_pressure_angle)}
     for k, p in enumerate(task.positions, 1):
         limits[f"branch at position {k}"] = _branch_slack(designs, psi1 + p.dpsi, phi1 + p.dphi)
-    return NamedCandidates(residuals, limits, acceleration(designs), named(designs))
+    return Candidates(residuals, limits, acceleration(designs), named(designs))
 
 
 def _branch_slack(designs: Array, psi: Array, phi: Array) -> Array:
@@ -116,7 +116,7 @@ class Task1(LocusTask):
         """The place on the locus."""
         return (turning("phi1"),)
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         return through_positions(self, self.swing, self.phi0, x["phi1"], self.g, self.alpha, self.f)
 
@@ -163,7 +163,7 @@ class Task2(SynthesisTask):
         """Swing, phi0 and phi1, and g and alpha if they are free."""
         return (*ranges(self, "swing", "phi0"), turning("phi1"), *ranges(self, "g", "alpha"))
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         g, alpha = x.get("g", self.g), x.get("alpha", self.alpha)
         return through_positions(self, x["swing"], x["phi0"], x["phi1"], g, alpha)

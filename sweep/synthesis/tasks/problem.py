@@ -9,7 +9,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -94,17 +93,17 @@ class Unknown(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """Values of n candidates; a row without a mechanism is nan.
+    """Values of n candidates by name, (n,) each; nan if there is no mechanism.
 
-    ``equations`` (n, p) vanish at a solution, ``limits`` (n, q) hold if they are not negative, both scaled so that 1 is
-    a large violation.  The objective of a candidate is the largest magnitude in its row of ``curve`` (n, m).
-    ``results`` holds the mechanisms: columns of (n,), named like the parameters of families.
+    ``equations`` vanish at a solution, ``limits`` hold if they are not negative, both scaled so that 1 is a large
+    violation.  The objective of a candidate is the largest magnitude in its row of ``curve`` (n, m).  ``results`` holds
+    the mechanisms, named like the parameters of families; one that is the same for all candidates may be a number.
     """
 
-    equations: Array
-    limits: Array
+    equations: Mapping[str, Array]
+    limits: Mapping[str, Array]
     curve: Array
-    results: dict[str, Array]
+    results: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -134,18 +133,6 @@ class Solution:
         return "\n".join(lines)
 
 
-class NamedCandidates(NamedTuple):
-    """`Candidates` of a task by name: equations and limits (n,) each, the curve (n, m), the mechanisms.
-
-    A column of ``results`` that is the same for all candidates may be a number.
-    """
-
-    equations: Mapping[str, Array]
-    limits: Mapping[str, Array]
-    curve: Array
-    results: Mapping[str, Any]
-
-
 @dataclass(frozen=True)
 class SynthesisTask(ABC):
     """One of the tasks of the engineering method with its numbers, the argument of `solve`.
@@ -173,31 +160,12 @@ class SynthesisTask(ABC):
         """Unknowns of the task."""
 
     @abstractmethod
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns by name, (n,) each."""
 
-    @cached_property
-    def _named(self) -> NamedCandidates:
-        return self._bounded(np.array([[0.5 * (u.low + u.high) for u in self.unknowns]]))
-
-    @property
-    def equations(self) -> tuple[str, ...]:
-        """Names of the equations, at most as many as unknowns."""
-        return tuple(self._named.equations)
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Names of the limits."""
-        return tuple(self._named.limits)
-
     def evaluate(self, x: Array) -> Candidates:
-        """Return equations, limits, objective curve and mechanisms of candidates x (n, number of unknowns)."""
-        n, named = len(x), self._bounded(x)
-        return Candidates(_stacked(n, named.equations), _stacked(n, named.limits), named.curve, dict(named.results))
-
-    def _bounded(self, x: Array) -> NamedCandidates:
         """Return the values of candidates x (n, unknowns), with slacks of the bounds in units of their range."""
-        named = self.named_candidates(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
+        named = self.candidates(dict(zip((u.name for u in self.unknowns), x.T, strict=True)))
         limits = dict(named.limits)
         results = {
             name: np.broadcast_to(np.asarray(x, np.float64), len(named.curve)) for name, x in named.results.items()
@@ -208,11 +176,6 @@ class SynthesisTask(ABC):
             limits[f"{name} not below"] = (results[name] - low) / (high - low)
             limits[f"{name} not above"] = (high - results[name]) / (high - low)
         return named._replace(limits=limits, results=results)
-
-
-def _stacked(count: int, columns: Mapping[str, Array]) -> Array:
-    """Return columns (n,) side by side as (n, k), also for k = 0."""
-    return np.column_stack(list(columns.values())) if columns else np.empty((count, 0))
 
 
 def turning(name: str) -> Unknown:

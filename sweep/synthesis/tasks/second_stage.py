@@ -19,7 +19,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, Number, broadcast_columns, turn, with_tops
-from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, turning
+from sweep.synthesis.tasks.problem import Candidates, SynthesisTask, Unknown, turning
 
 RSSP = family("rssp")
 SIDEWAYS = {"along": (-4.0, 6.0), "across": (-4.0, 4.0)}
@@ -196,7 +196,7 @@ class Task6(SynthesisTask):
         """Proportions of the second stage relative to its crank, and the crank angle at J1."""
         return (*(Unknown(name, *ends) for name, ends in STAGES[self.second].shape.items()), turning("theta1"))
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         first, stage, theta = self._first, STAGES[self.second], x["theta1"]
         shape = {name: x[name] for name in stage.shape}
@@ -229,7 +229,7 @@ class Task6(SynthesisTask):
             family(["rssr", self.second]).parameter_names
         )
         named_columns = {name: column for name, column in columns.items() if name not in beyond}
-        return NamedCandidates(
+        return Candidates(
             equations, limits, with_tops(d2s), named_columns | {"x0": origin.real, "y0": origin.imag, "beta0": beta}
         )
 
@@ -293,7 +293,7 @@ class Task7(SynthesisTask):
         low, high = (limit * abs(self.stroke) for limit in self.size_range)
         return Unknown("a2", low, high), Unknown("b2", low, high), Unknown("e2", -high, high), turning("theta1")
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         theta, first = x["theta1"], self._first
         columns = first.columns | {f"{name}2": x[f"{name}2"] for name in ("a", "b", "e")}
@@ -308,6 +308,6 @@ class Task7(SynthesisTask):
             equations[f"acceleration at the {end}"] = self.kappa * second * ds[:, k] / value - 1.0
         d2s, angle = chain_motion("rssp", columns, "d2s", "pressure_angle2")
         limits = {"pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle)}
-        return NamedCandidates(
+        return Candidates(
             equations, limits, with_tops(d2s if self.objective == "acceleration" else np.sin(angle)), columns
         )

@@ -6,8 +6,8 @@ are central differences, all rows in one call of the problem, whose kernels are 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,20 @@ ENOUGH, ALIKE = 4, 1e-4  # number of samples that have to end at the best object
 APART = 1e-2  # share of the box: closer solutions count as the same
 
 
+class _Rows(NamedTuple):
+    """Equations (n, p), limits (n, q) and curve (n, m) of candidates side by side, or of one candidate."""
+
+    equations: Array
+    limits: Array
+    curve: Array
+
+
+def _rows(value: Candidates) -> _Rows:
+    none = np.empty((len(value.curve), 0))
+    equations, limits = (np.column_stack([none, *group.values()]) for group in (value.equations, value.limits))
+    return _Rows(equations, limits, value.curve)
+
+
 class _Scaled:
     """A problem scaled to the unit box."""
 
@@ -40,11 +54,11 @@ class _Scaled:
         x: Array = self.low + self.span * np.where(self.periodic, z % 1.0, z)
         return x
 
-    def rows(self, z: Array) -> Candidates:
+    def rows(self, z: Array) -> _Rows:
         """Return equations, limits and curves at points (n, k)."""
-        return self.problem.evaluate(self.real(np.atleast_2d(z)))
+        return _rows(self.problem.evaluate(self.real(np.atleast_2d(z))))
 
-    def with_gradient(self, z: Array) -> tuple[Candidates, Candidates]:
+    def with_gradient(self, z: Array) -> tuple[_Rows, _Rows]:
         """Return the values at z and their derivatives, (k, ...) each; one-sided if a neighbour has no mechanism."""
         k = z.size
         steps = STEP * np.eye(k)
@@ -55,8 +69,8 @@ class _Scaled:
             difference = np.where(np.isnan(difference), (ahead - centre) / STEP, difference)
             return np.nan_to_num(np.where(np.isnan(difference), (centre - behind) / STEP, difference))
 
-        at, limits, curve, _ = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
-        return Candidates(at[0], limits[0], curve[0], {}), Candidates(slope(at), slope(limits), slope(curve), {})
+        at, limits, curve = self.rows(np.vstack([z[None, :], z + steps, z - steps]))
+        return _Rows(at[0], limits[0], curve[0]), _Rows(slope(at), slope(limits), slope(curve))
 
 
 def solve(
@@ -142,13 +156,13 @@ def _distance(scaled: _Scaled, one: Array, other: Array) -> float:
     return float(np.where(scaled.periodic, np.minimum(gap % 1.0, 1.0 - gap % 1.0), gap).max())
 
 
-def _violation(value: Candidates) -> Array:
+def _violation(value: _Rows) -> Array:
     rows = [np.abs(value.equations), np.maximum(-value.limits, 0.0)]
     worst: Array = np.concatenate(rows, axis=1).max(axis=1, initial=0.0)
     return worst
 
 
-def _feasible(value: Candidates) -> bool:
+def _feasible(value: _Rows) -> bool:
     """Tell whether one point is a mechanism that satisfies equations and limits."""
     return bool(np.isfinite(value.curve).all() and _violation(value)[0] <= MET)
 
@@ -240,15 +254,15 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
                            np.column_stack([slope.equations.T, np.zeros(equal.size)]))  # fmt: skip
         return cache[key]
 
-    gradient = np.append(np.zeros(z.size), 1.0)
+    start, gradient = np.append(z, 1.0), np.append(np.zeros(z.size), 1.0)
     constraints = [{"type": "ineq", "fun": lambda p: parts(p)[0], "jac": lambda p: parts(p)[1]}]
-    if scaled.problem.equations:
+    if parts(start)[2].size:
         constraints.append({"type": "eq", "fun": lambda p: parts(p)[2], "jac": lambda p: parts(p)[3]})
     low, high = _bounds(scaled, z)
     bounds = [*zip(np.maximum(low, z - radius), np.minimum(high, z + radius), strict=True), (0.0, None)]
     run: Any = minimize
     result = run(
-        lambda p: p[-1], np.append(z, 1.0), jac=lambda p: gradient, method="SLSQP", bounds=bounds,
+        lambda p: p[-1], start, jac=lambda p: gradient, method="SLSQP", bounds=bounds,
         constraints=constraints, options={"maxiter": 60, "ftol": 1e-12},
     )  # fmt: skip
     point: Array = np.clip(result.x[:-1], low, high)
@@ -258,14 +272,14 @@ def _descended(scaled: _Scaled, z: Array, top: float, used: NDArray[np.bool_], r
 def _solution(problem: SynthesisTask, x: Array) -> Solution:
     candidate = problem.evaluate(x[None, :])
     return Solution(
-        _feasible(candidate),
+        _feasible(_rows(candidate)),
         float(np.abs(candidate.curve).max()),
-        _named([u.name for u in problem.unknowns], x),
-        {name: float(column[0]) for name, column in candidate.results.items()},
-        _named(problem.equations, candidate.equations[0]),
-        _named(problem.limits, candidate.limits[0]),
+        {u.name: float(value) for u, value in zip(problem.unknowns, x, strict=True)},
+        _first(candidate.results),
+        _first(candidate.equations),
+        _first(candidate.limits),
     )
 
 
-def _named(names: Any, values: NDArray[np.float64]) -> dict[str, float]:
-    return {name: float(value) for name, value in zip(names, values, strict=True)}
+def _first(columns: Mapping[str, Array]) -> dict[str, float]:
+    return {name: float(column[0]) for name, column in columns.items()}

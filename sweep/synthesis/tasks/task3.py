@@ -13,7 +13,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.families.base import Accuracy, Angles, Array
 from sweep.synthesis.tasks.crank_rocker import RSSR, acceleration, designs_on_locus, named, outputs_of, pressure_limit
-from sweep.synthesis.tasks.problem import NamedCandidates, SynthesisTask, Unknown, ranges, turning
+from sweep.synthesis.tasks.problem import Candidates, SynthesisTask, Unknown, ranges, turning
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,7 +88,7 @@ class Task3(SynthesisTask):
     def _value(self, k: int) -> str:
         return f"{self.adjusted} of setting {k}"
 
-    def named_candidates(self, x: Mapping[str, Array]) -> NamedCandidates:
+    def candidates(self, x: Mapping[str, Array]) -> Candidates:
         """Compute equations, limits, curve and mechanisms of candidates from their unknowns, (n,) each."""
         place = (x["phi1"], self.e, x["f"], x.get("g", self.g), x.get("alpha", self.alpha))
         first, _ = designs_on_locus(self.swing, self.phi0, *place)
@@ -104,7 +104,7 @@ class Task3(SynthesisTask):
             f"pressure angle of setting {k}": pressure_limit(design, self.max_pressure_angle)
             for k, design in enumerate(designs, 1)
         }
-        return NamedCandidates(equations, limits, np.hstack([acceleration(design) for design in designs]), results)
+        return Candidates(equations, limits, np.hstack([acceleration(design) for design in designs]), results)
 
 
 def adjustments(design: Mapping[str, float]) -> pd.DataFrame:
