@@ -23,7 +23,8 @@ FORMULAS = (
     "(2) P = M/h, h = c cos theta1 - mu [k_j d (Pi1 + Pi2)/(2 L) + r_t |x|], L = |z2 - z1|; h <= 0 is self-locking",
     "(3) journals p_i = P Pi_i/(L d l_i), collar p_3 = 4 P |x|/(pi (d0^2 - d^2));",
     "    permissible theta1: first crossing of max p_i/p_i,adm = 1",
-    "(4) rolling: P_eq = K V R if F_a <= e V R else K (X V R + Y F_a); permissible P_eq = C (60 n L_h/10^6)^(-1/p)",
+    "(4) rolling: P_eq = K V R if F_a <= e V R else K (X V R + Y F_a); permissible P_eq = C (60 n L_h/10^6)^(-1/p),",
+    "    n the speed of the crank [rpm]: an oscillating rocker counts as one that turns with it",
 )
 
 SUPPORTS = (

@@ -32,7 +32,8 @@ SLIDING_FORMULAS = (
 )
 ROLLING_FORMULAS = (
     *LIFE_FORMULAS,
-    "(4) P = K V F if |F_axial| <= e V F else K (X V F + Y |F_axial|); permissible P = C (60 n L_h/10^6)^(-1/p)",
+    "(4) P = K V F if |F_axial| <= e V F else K (X V F + Y |F_axial|); permissible P = C (60 n L_h/10^6)^(-1/p),",
+    "    n the speed of the crank [rpm], whatever the shaft's own travel; lives count the travel",
 )
 
 

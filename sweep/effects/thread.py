@@ -8,9 +8,10 @@ from kernels.effects.thread import capstan, thread_contour, thread_speed
 from kernels.types import Status
 from sweep.effects.base import Effect
 from sweep.effects.loads import CHANGE
-from sweep.effects.scene import Scene
+from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Output, Parameter, floats
 from sweep.families.capabilities import ThreadPath
+from sweep.families.curve_features import Bends
 from sweep.families.machines import thread_balance as balance
 from sweep.families.poses import chosen, filled_each
 
@@ -32,7 +33,12 @@ SPEED_INPUTS = (
               default=balance.MM_PER_M * float(balance.REFERENCE_SPEED.default or 0.0)),
     Parameter("thread_speed_share", "none", balance.SHARE.text, default=balance.SHARE.default),
     Parameter("thread_speed_exponent", "none", balance.EXPONENT.text, positive=True, default=balance.EXPONENT.default),
+    Parameter("thread_speed_low", "none", "lowest speed of the measurements, mm/s: a slower thread counts as this fast",
+              not_negative=True, default=balance.MM_PER_M * balance.MEASURED_SPEED.low),
+    Parameter("thread_speed_high", "none", "highest speed of the measurements, mm/s: a faster one counts as this fast",
+              positive=True, default=balance.MM_PER_M * balance.MEASURED_SPEED.high),
 )  # fmt: skip
+MEASURED = ("thread_speed_low", "thread_speed_high")
 CAPSTAN_INPUTS = (BEFORE, Parameter("mu_eyelet", "ratio", "coefficient of friction of the eyelet", not_negative=True))
 
 CONTOUR_EQUATION = "docs/thread.md (1) to (3)"
@@ -47,8 +53,12 @@ SPEED_OUTPUTS = (
     Output("thread_speed", "length/s", "speed at which thread is taken up", SPEED_EQUATION),
     Output("thread_acceleration", "length/s^2", "acceleration at which thread is taken up", SPEED_EQUATION),
     Output(
-        "speed_ratio", "1", "tension at that speed over the tension at the reference speed", SPEED_EQUATION, kinks=True
-    ),  # steep next to thread at rest, constant beyond the measured range
+        "speed_ratio",
+        "1",
+        "tension at that speed, within the measured speeds, over the tension at the reference speed",
+        SPEED_EQUATION,
+        kinks=True,
+    ),
 )
 CAPSTAN_EQUATION = "docs/thread.md (5), (6)"
 CAPSTAN_OUTPUTS = (
@@ -99,9 +109,18 @@ def speed(scene: Scene, wanted: frozenset[str]) -> Columns:
     if "speed_ratio" in wanted:
         ratio = np.empty(scene.shape)
         data = scene.table(("thread_speed_ref", "thread_speed_share", "thread_speed_exponent"))
-        thread_speed(of_thread, data, status, ratio)
+        low, high = (scene.inputs[name][:, None] for name in MEASURED)
+        refuse(status, (high < low)[:, 0])
+        thread_speed(np.clip(np.abs(of_thread), low, high), data, status, ratio)
         columns["speed_ratio"] = ratio
     return chosen(columns, wanted, status)
+
+
+def measured_ends(scene: Scene) -> Array:
+    """Functions that change sign where the thread's speed enters or leaves the measured range, (n, m, 4)."""
+    (of_thread,) = floats(speed(scene, frozenset({"thread_speed"})), "thread_speed")
+    ends = [way * scene.inputs[name][:, None] for name in MEASURED for way in (-1.0, 1.0)]
+    return np.stack([of_thread - end for end in ends], axis=2)
 
 
 CONTOUR = Effect(
@@ -129,6 +148,7 @@ SPEED = Effect(
     inputs=SPEED_INPUTS,
     outputs=SPEED_OUTPUTS,
     compute=speed,
+    bends=(Bends(frozenset({"speed_ratio"}), measured_ends),),
     called_for="wide range of the thread's speed",
     negligible="speed within +-30 % of the reference: less than 3 %",
     requires=ThreadPath,

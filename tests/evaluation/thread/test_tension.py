@@ -62,23 +62,18 @@ def test_speed_ratio_passes_through_the_reported_points():
     assert fast == pytest.approx(1.16, rel=1e-14)
 
 
+TAKE_UP = {"a": [20.0, 15.0, 24.0], "e": 30.0, "f": 10.0, "alpha": 0.5, "Z1": -30.0, "Z2": 40.0, "P_h": 60.0}
+EVERY_SPEED = {"thread_speed_low": 0.0, "thread_speed_high": 1e9}
+
+
 @pytest.mark.parametrize("target", [1e-3, 1e-9])
 def test_largest_speed_ratio_over_the_turn_is_that_of_the_fastest_thread_and_the_least_is_not_claimed(target):
-    table = {
-        "a": [20.0, 15.0, 24.0],
-        "e": 30.0,
-        "f": 10.0,
-        "alpha": 0.5,
-        "Z1": -30.0,
-        "Z2": 40.0,
-        "P_h": 60.0,
-        "speed": 520.0,
-    }
+    table = TAKE_UP | EVERY_SPEED | {"speed": 520.0}
     names = ["max_speed_ratio", "min_speed_ratio", "max_abs_thread_speed"]
     found = sweep.summarise("eyelet", table, names[:1], accuracy=target)
     assert (found.status == st.OK).all()
     fastest = sweep.summarise("eyelet", table, names[2:], accuracy=1e-12).max_abs_thread_speed
-    share, exponent = sweep.effects.effect("thread_speed").inputs[-2:]
+    share, exponent = sweep.effects.effect("thread_speed").inputs[-4:-2]
     exact = 1.0 + share.default * ((fastest / 1230.0) ** exponent.default - 1.0)
     # the fastest thread is known to 1e-12
     assert (np.abs(found.max_speed_ratio - exact) <= found.err_max_speed_ratio + 1e-12).all()
@@ -86,6 +81,23 @@ def test_largest_speed_ratio_over_the_turn_is_that_of_the_fastest_thread_and_the
     # a thread at rest: a cusp that no pose reaches, so the number is not sure and its error says by how much
     assert (least.status == st.NOT_CONVERGED).all()
     assert (least.min_speed_ratio - (1.0 - share.default) <= least.err_min_speed_ratio).all()
+
+
+def test_speed_ratio_ends_with_the_measured_speeds():
+    """The thread is slower than 0.08 m/s where it reverses, and at most as fast as 10, 6.5 and 13 m/s."""
+    phi = np.linspace(0.0, 6.28, 315)
+    for speed in (520.0, -520.0, 0.1):
+        table = TAKE_UP | {"speed": speed}
+        poses = sweep.evaluate("eyelet", table, ["thread_speed", "speed_ratio"], phi=phi)
+        law = sweep.thread.speed({"v": np.clip(np.abs(poses.thread_speed) / 1e3, 0.08, 7.4)}).ratio_to_ref
+        # Both are the law; the speeds differ by the rounding of a division.
+        np.testing.assert_allclose(poses.speed_ratio, law, rtol=4e-16)
+    found = sweep.summarise("eyelet", TAKE_UP | {"speed": 300.0}, ["max_speed_ratio", "min_speed_ratio"], accuracy=1e-9)
+    assert (found.status == st.OK).all()
+    assert (np.abs(found.min_speed_ratio - 1.0 / 1.19) <= found.err_min_speed_ratio + 1e-15).all()
+    fastest = sweep.summarise("eyelet", TAKE_UP | {"speed": 300.0}, ["max_abs_thread_speed"], accuracy=1e-12)
+    most = sweep.thread.speed({"v": np.minimum(fastest.max_abs_thread_speed / 1e3, 7.4)}).ratio_to_ref
+    assert (np.abs(found.max_speed_ratio - most) <= found.err_max_speed_ratio + 1e-12).all()
 
 
 def test_speed_ratio_of_a_thread_at_rest_is_what_does_not_depend_on_speed():
