@@ -1,4 +1,4 @@
-"""Branch and bound over boxes of designs: the bound that the rows of a box prove together, and the queue of boxes.
+"""Branch and bound over boxes of designs: the bound that the rows of a box prove together.
 
 A row is a function of the design, enclosed over a box as a form (:mod:`kernels.boxes.taylor`).  Rows of the objective
 are at most the value t of a design; rows of limits are at least 0 in a feasible one.  With multipliers that are not
@@ -204,41 +204,3 @@ def surely_negative(rows: Array, j: int, n: int, total: Array) -> bool:
         total[k] = -rows[j, k]
     total[total.shape[0] - 1] = rows[j, total.shape[0] - 1]
     return bool(least(total, n) > 0.0)
-
-
-@inline
-def _before(bounds: Array, depths: Indices, one: int, other: int) -> bool:
-    """Whether a box comes before another: by the lower bound, among equal bounds by the smaller depth."""
-    if bounds[one] != bounds[other]:
-        return bool(bounds[one] < bounds[other])
-    return bool(depths[one] < depths[other])
-
-
-@kernel
-def push(heap: Indices, count: int, bounds: Array, depths: Indices, box: int) -> None:
-    """Add a box to a heap of ``count`` boxes, of which the first has the least bound."""
-    place = count
-    while place > 0:
-        above = (place - 1) // 2
-        if not _before(bounds, depths, box, heap[above]):
-            break
-        heap[place] = heap[above]
-        place = above
-    heap[place] = box
-
-
-@kernel
-def pop(heap: Indices, count: int, bounds: Array, depths: Indices) -> int:
-    """Remove the box of least bound from a heap of ``count`` boxes, and return it."""
-    first, last = heap[0], heap[count - 1]
-    place, size = 0, count - 1
-    while 2 * place + 1 < size:
-        below = 2 * place + 1
-        if below + 1 < size and _before(bounds, depths, heap[below + 1], heap[below]):
-            below += 1
-        if not _before(bounds, depths, heap[below], last):
-            break
-        heap[place] = heap[below]
-        place = below
-    heap[place] = last
-    return int(first)

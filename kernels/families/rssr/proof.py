@@ -7,11 +7,12 @@ that reaches the target.
 from __future__ import annotations
 
 import math
+from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
 
-from kernels.boxes.branching import COMBINED, OPEN, TOO_SMALL, Flags, Indices, pop, push
+from kernels.boxes.branching import COMBINED, OPEN, TOO_SMALL, Flags, Indices
 from kernels.families.rssr import box_turn as bt
 from kernels.families.rssr.box_peaks import POSES
 from kernels.families.rssr.box_problem import BoxQuestion, BoxScratch, room
@@ -101,15 +102,13 @@ def explore(
     any_crank = p.tube.shape[0] > 0 and f.slots[bt.FREE_PASSED] >= 0 and p.limits[1] < math.inf
     scratch, used = np.zeros((4, POSES)), np.zeros(POSES, np.uint8)
     lows, highs, bounds = np.zeros((boxes + most, n)), np.zeros((boxes + most, n)), np.zeros(boxes + most)
-    heap, depths = np.zeros(boxes + most, np.int64), np.zeros(boxes + most, np.int64)
-    waiting, filled, judged = 0, 0, 0
-    for i in range(boxes):
-        lows[i], highs[i], bounds[i] = starts[0][i], starts[1][i], starts[2][i]
-        push(heap, waiting, bounds, depths, i)
-        waiting += 1
-    while waiting > 0 and judged < most:
-        box = pop(heap, waiting, bounds, depths)
-        waiting -= 1
+    filled, judged = 0, 0
+    lows[:boxes], highs[:boxes], bounds[:boxes] = starts
+    # the least bound first, among equal bounds the smaller depth
+    waiting = [(bounds[i], 0, i) for i in range(boxes)]
+    heapify(waiting)
+    while waiting and judged < most:
+        _, depth, box = heappop(waiting)
         judged += 1
         lo, hi = lows[box], highs[box]
         found, loose = rows, rows.loose
@@ -128,13 +127,9 @@ def explore(
         middle = 0.5 * (lo[k] + hi[k])
         lows[boxes], highs[boxes], bounds[boxes] = lo, hi, bounds[box]
         lows[boxes, k], highs[box, k] = middle, middle
-        depths[box] += 1
-        depths[boxes] = depths[box]
-        push(heap, waiting, bounds, depths, box)
-        push(heap, waiting + 1, bounds, depths, boxes)
-        waiting += 2
+        heappush(waiting, (bounds[box], depth + 1, box))
+        heappush(waiting, (bounds[box], depth + 1, boxes))
         boxes += 1
-    for i in range(waiting):
-        box = heap[i]
+    for _, _, box in waiting:
         filled = _record(leaves, filled, lows[box], highs[box], OPEN, bounds[box], found, 0)
     return filled, judged
