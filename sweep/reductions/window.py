@@ -51,8 +51,11 @@ class Window(NamedTuple):
         return passed | np.roll(passed, 1, axis=1)
 
     def grazed(self, rows: Indices, positions: Array) -> Mask:
-        """Whether the motion may pass a limit of the window twice between two samples."""
-        doubtful = np.zeros(rows.size, np.bool_)
+        """Whether the motion may pass a limit of the window twice between two samples.
+
+        It does where no sample is near the window, as every window of the stroke is passed.
+        """
+        doubtful: Mask = np.logical_not(np.any(self.nears(rows, positions), axis=1))
         for level in (self.low[rows], self.high[rows]):
             scan.grazes(positions, level, doubtful)
         return doubtful

@@ -7,6 +7,7 @@ angle and far below elsewhere.
 
 from __future__ import annotations
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -177,3 +178,45 @@ def test_error_is_that_of_exact_ends_at_loose_targets(window):
     found = sweep.summarise("rssr", ROCKERS, "window_angle", accuracy=1e-2, window=window)
     assert (found.status == 0).all() and (found.err_window_angle <= 1e-8).all()
     assert (np.abs(found.window_angle - exact.window_angle) <= found.err_window_angle).all()
+
+
+# The follower of its guide is at its lowest point next to a pose of coarse samples.
+NARROW = {
+    "a": 0.18172147599251193, "b": 3.853540537411128, "c": 2.536402990434361,
+    "e": 1.8148205791431087, "xi": 3.8940469376621047, "eta": 0.11187313081782202,
+    "lam": 2.1876039628469206, "h": 2.066737079326538, "branch": 1.0,
+}  # fmt: skip
+
+
+def guided(phi):
+    """Position and deviation of the guided point of NARROW, with mpmath."""
+    a, b, c, e, xi, eta, lam, h, branch = (mp.mpf(x) for x in NARROW.values())
+    x, y = e - a * mp.cos(phi), a * mp.sin(phi)
+    w = (a * a - b * b + c * c + e * e) / (2 * c) - a * e / c * mp.cos(phi)
+    r, t = x * x + y * y, branch * mp.sqrt(x * x + y * y - w * w)
+    pin = mp.mpc(a * mp.cos(phi), y)
+    joint = e + c * mp.mpc(-(x * w + y * t), y * w - x * t) / r
+    along = (pin + (joint - pin) / b * mp.mpc(xi, eta)) * mp.expj(-lam)
+    return along.real, along.imag - h
+
+
+def extreme(sense):
+    """Crank angle at which the position is largest, or with -1 smallest."""
+    best = max((2 * mp.pi * k / 240 for k in range(240)), key=lambda phi: sense * guided(phi)[0])
+    return mp.findroot(lambda phi: mp.diff(lambda at: guided(at)[0], phi), best)
+
+
+@pytest.mark.parametrize("accuracy", [1e-2, 1e-8])
+@pytest.mark.parametrize("upper", [1e-4, 1e-5, 1e-6])
+def test_deviation_in_a_window_shorter_than_the_samples_has_its_value(upper, accuracy):
+    """No sample was in it and a parabola saw none: the value was nan, the status INVALID_INPUT."""
+    found = sweep.summarise("guide", NARROW, "max_abs_dev", accuracy=accuracy, window=(0.0, upper)).iloc[0]
+    with mp.workdps(40):
+        low, high = extreme(-1), extreme(1)
+        rise = upper * (guided(high)[0] - guided(low)[0])
+        reach = mp.sqrt(2 * rise / mp.diff(lambda phi: guided(phi)[0], low, 2))
+        ends = [mp.findroot(lambda phi: guided(phi)[0] - guided(low)[0] - rise, low + k * reach) for k in (-1, 1)]
+        # The deviation passes the lowest point at a slope: it is largest where the window ends.
+        exact = float(max(abs(guided(phi)[1]) for phi in ends))
+    assert found["status"] == st.OK
+    assert abs(found["max_abs_dev"] - exact) <= found["err_max_abs_dev"] + 2.0**-52 * exact  # exact is rounded once
