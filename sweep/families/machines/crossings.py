@@ -19,7 +19,7 @@ from kernels.curves import samples as scan
 from kernels.types import TWO_PI, Array
 from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work
 from sweep.families.machines.relations import Relation
-from sweep.numerics.events import beyond, bottoms, first_passage, passages, zeros
+from sweep.numerics.events import LAST, beyond, bottoms, first_passage, passages, zeros
 from sweep.numerics.records import Indices, Mask, only
 
 if TYPE_CHECKING:
@@ -270,11 +270,14 @@ class Poses:
         which = values[:, 1:-1].argmin(axis=1) + 1
         place: Array = np.take_along_axis(grid, which[:, None], axis=1)[:, 0]
         place = np.where(which == 1, start, np.where(which == samples, end, place))
-        k, j = np.nonzero((values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:]))
+        dips = (values[:, 1:-1] <= values[:, :-2]) & (values[:, 1:-1] <= values[:, 2:])
+        # A dip between the least sample and its neighbours shows in no sample if that one lies at an end.
+        k, j = np.nonzero(dips | (np.arange(1, samples + 1) == which[:, None]))
         if k.size:
             # To rounding, not to its square root: where axes meet the curve is a wedge as steep as the bodies are fast.
-            phi = bottoms(lambda places: self.near(row[k], places, name), grid[k, j], grid[k, j + 2])
-            phi = np.clip(phi, start[k], end[k])
+            low, high = np.maximum(grid[k, j], start[k]), np.minimum(grid[k, j + 2], end[k])
+            phi = bottoms(lambda places: self.near(row[k], places, name), low, high)
+            phi = np.where(phi - start[k] <= LAST, start[k], np.where(end[k] - phi <= LAST, end[k], phi))
             height = self.at(row[k], phi, name)[0]
             least = values[:, 1:-1].min(axis=1)
             for one in np.argsort(-height, kind="stable"):  # the smallest one last

@@ -12,6 +12,9 @@ from mpmath import mp, mpf
 
 import sweep
 from kernels import status as st
+from sweep.evaluation.tables import design_matrix
+from sweep.families import family
+from sweep.families.machines.crossings import Poses
 from sweep.families.machines.segments import closest, triple_product
 
 TABLE = json.loads((Path(__file__).parents[2] / "oracle" / "machine_open.json").read_text())["rows"]
@@ -112,6 +115,16 @@ def test_least_gap_over_the_turn_is_that_of_the_table():
         assert error <= max(found["err_min_free"], FACTOR * 2.0**-53 * float(row["cond"]["distance"])), row["expected"]
         apart = abs(found["phi_min_free"] - float(row["expected"]["phi"]))
         assert min(apart, 2.0 * math.pi - apart) < 1e-6
+
+
+def test_a_dip_beside_the_end_that_no_sample_shows_is_the_least():
+    """The slider is 0.7 rad earlier in its turn at each sample: samples only fall, and between them it was folded."""
+    mechanism = family("slider_crank")
+    poses = Poses(mechanism, mechanism.precise(), design_matrix(mechanism, {"a": 20.0, "b": 70.0, "e": 0.0})[0])
+    start, end = np.array([5.9]), np.array([5.9 + 3.0 * (2.0 * math.pi - 0.7)])
+    place = poses.least(np.zeros(1, np.intp), start, end, "s", samples=4)
+    # Heights near the place differ by their rounding within a root of it.
+    assert abs(place[0] - 7.0 * math.pi) < 1e-7
 
 
 def dense(machine, design, needle):
