@@ -161,7 +161,9 @@ def loop_of_part(loop: Assembly, named: Callable[[str], str], part: DesignMap) -
 
 
 def _loop(stage: Stage, loop: Assembly) -> Assembly:
-    return loop_of_part(loop, lambda name: f"{name}{stage.number}", stage.designs)
+    # rates are those of the whole chain, which carry no number: only a last stage names one
+    rates = {o.name for o in stage.family.pose_outputs if _is_rate(o, stage.family)}
+    return loop_of_part(loop, lambda name: name if name in rates else f"{name}{stage.number}", stage.designs)
 
 
 def _numbered(families: tuple[Family, ...]) -> tuple[tuple[Stage, ...], tuple[Parameter, ...]]:

@@ -60,6 +60,12 @@ def _column(name: str, designs: Array) -> Array:
     return parameter(PARAMETERS, name, designs)
 
 
+def _may_part(designs: Array) -> Array:
+    """Whether link or heddle rod may fail to reach where the rod does: not with a parallel linkage and a long rod."""
+    arm, back, frame, link, rod = (_column(name, designs) for name in ("O3D", "O4F", "O3O4", "DF", "EG"))
+    return (arm != back) | (frame != link) | (rod > 0.0)  # type: ignore[no-any-return]
+
+
 def shaft_pivot(designs: Array) -> Array:
     """Return O4, along O2O3 behind O3: the drawing puts both frames on one line."""
     x = _column("O2O3", designs) + _column("O3O4", designs)
@@ -112,7 +118,7 @@ FAMILY = Family(
     points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)},
     capabilities=(
         Dimensions(links("O2B BC O3C O4E"), optional=("O3D", "O4F", "DF", "EG")),
-        Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "BC")),
+        Assembly("discriminant", "pressure_angle", squared(PARAMETERS, "BC"), end=("d2y", _may_part)),
         heddle_shaft(PARAMETERS, shaft_line),
         Skeleton(
             {

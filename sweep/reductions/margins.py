@@ -83,6 +83,9 @@ def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
         which = np.where(np.isnan(values), -np.inf, sign * values).argmax(axis=0)[None, :]
         result[name] = np.take_along_axis(values, which, axis=0)[0]
         result[f"err_{name}"] = np.take_along_axis(errors, which, axis=0)[0]
+    # Where a stage has no margin because something else ends its motion, the weakest is unknown.
+    unknown = ~rotatable & (result["margin"] > result["err_margin"])
+    result["margin"][unknown], result["err_margin"][unknown] = np.nan, np.nan
     result["max_pressure_angle"][~rotatable] = np.nan
     result["err_max_pressure_angle"][~rotatable] = np.nan
     return result
@@ -143,8 +146,10 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target
     late = (at_least == st.OK) & (unknown == st.NOT_CONVERGED)
     # A discriminant with nan in it: the status of those poses gives the reason.
     status = np.where(known, at_least, np.where(unknown == st.OK, st.NOT_CONVERGED, unknown)).astype(np.uint8)
-    ended = _ended(family, designs, loop, status)
-    status[ended], least.value[ended], least.err[ended] = st.NOT_ROTATABLE, np.nan, np.nan
+    status[_ended(family, designs, loop, status)] = st.NOT_ROTATABLE
+    # It is not this loop that ends the motion: its discriminant says nothing about the place.
+    elsewhere = (status == st.NOT_ROTATABLE) & (least.value > 0.0)
+    least.value[elsewhere], least.err[elsewhere] = np.nan, np.nan
     turns = status == st.OK
     status[turns & late] = st.NOT_CONVERGED
     scale = loop.scale(designs)

@@ -308,3 +308,41 @@ def test_gradient_of_a_parallelogram_by_one_length_is_that_of_the_linkage(name):
     assert np.abs(by_differences).min() > 1e-3
     # central differences of a smooth function: the square of step/length, and rounding over the step
     np.testing.assert_allclose(got[2].imag / 1e-20, by_differences, rtol=1e-7, atol=1e-8)
+
+
+SHORT_OF = {"O2B": 1.0, "BC": 4.0, "O3C": 2.5, "O2O3": 4.4, "O4E": 3.0, "chi_mid": 1.4, "side_F": 1.0, "side_C": 1.0}
+LINKED_ARMS = {"O3D": 1.2, "O4F": 2.2, "O3O4": 4.0}
+
+
+def _reaches(values):
+    """Lengths that link and heddle rod need over the turn, from points and circles (the rod with x_s = 0.3)."""
+    b = values["O2B"] * np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 100_001))
+    ray = values["O2O3"] - b
+    along = (values["BC"] ** 2 - values["O3C"] ** 2 + np.abs(ray) ** 2) / (2.0 * np.abs(ray))
+    c = b + (along + 1j * np.sqrt(values["BC"] ** 2 - along**2)) * ray / np.abs(ray)
+    turned = (c - values["O2O3"]) * np.exp(-1j * values["chi_mid"]) / values["O3C"]
+    link = np.abs(LINKED_ARMS["O3O4"] - LINKED_ARMS["O3D"] * 1j * turned)
+    return float(link.max()) - LINKED_ARMS["O4F"], float(np.abs(values["O4E"] * turned.real - 0.3).max())
+
+
+# The ends of the reach are smooth extremes: 100 000 angles find them to 1e-9 of a length, far below these parts.
+@pytest.mark.parametrize("part", [1e-1, 1e-3, 1e-6])
+@pytest.mark.parametrize("chain", ["heddle", ["rssr", "heddle"]])
+def test_a_heddle_whose_link_or_rod_does_not_reach_within_the_turn_is_not_rotatable(chain, part):
+    link, rod = _reaches(SHORT_OF)
+    table = [
+        SHORT_OF | lengths | {"x_s": 0.3}
+        for sign in (1.0, -1.0)
+        for lengths in (LINKED_ARMS | {"DF": link * (1.0 + sign * part)}, {"EG": rod * (1.0 + sign * part)})
+    ]
+    table = {name: [one.get(name, 0.0) for one in table] for name in FIELDS}
+    if chain != "heddle":  # behind a double crank, which turns the cam lever fully
+        first = {"a": 4.0, "b": 4.0, "c": 4.2, "e": 1.0, "f": 0.0, "g": 0.0, "alpha": 0.0}
+        table = {f"{k}2": v for k, v in table.items()} | {f"{k}1": [v] * 4 for k, v in first.items()}
+    for settings_of in ({"accuracy": 1e-9}, {"samples": 64}):
+        got = sweep.summarise(chain, table, ["rotatable", "margin", "max_pressure_angle"], **settings_of)
+        assert got["rotatable"].tolist() == [True, True, False, False]
+        assert got["status"].tolist() == [st.OK, st.OK, st.NOT_ROTATABLE, st.NOT_ROTATABLE]
+        # the rod of the cam lever reaches: its discriminant is positive and would be no margin of what jams
+        assert np.isfinite(got["margin"]).tolist() == [True, True, False, False]
+        assert np.isfinite(got["max_pressure_angle"]).tolist() == [True, True, False, False]
