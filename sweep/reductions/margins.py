@@ -84,7 +84,7 @@ def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
         result[name] = np.take_along_axis(values, which, axis=0)[0]
         result[f"err_{name}"] = np.take_along_axis(errors, which, axis=0)[0]
     # Where a stage has no margin because something else ends its motion, the weakest is unknown.
-    unknown = ~rotatable & (result["margin"] > result["err_margin"])
+    unknown = ~rotatable & np.greater(result["margin"], result["err_margin"])
     result["margin"][unknown], result["err_margin"][unknown] = np.nan, np.nan
     result["max_pressure_angle"][~rotatable] = np.nan
     result["err_max_pressure_angle"][~rotatable] = np.nan
