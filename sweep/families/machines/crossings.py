@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 SAMPLES, MOST = 512, 16384  # samples of a turn, and largest number before an event is given up
 BLOCK = 256  # designs at once: their samples stay in the caches
 TANGENT = 64.0 * 2.0**-53  # relative rounding of a distance, which is a difference of coordinates
+FLAT = 1e-9  # share of the largest slope that an extremum's may have
 NEAR = 1e-3  # share of a sample's step: the slope of a polynomial this close to the poses is trusted
 
 Places: TypeAlias = dict[str, Any]
@@ -181,8 +182,12 @@ class Poses:
         passes = (slope > 0.0) & (after <= 0.0) | (slope < 0.0) & (after >= 0.0)
         row, column = np.nonzero(passes | ends)
         left, right, end = column * step, (column + 1) * step, ends[row, column]
-        phi = np.empty(row.size)
+        phi = 0.5 * (left + right)
         phi[~end] = self._root(row[~end], left[~end], right[~end], rate, slope)
+        # A cam that turns back without a dwell is so flat there that polynomials miss the place by more than they show.
+        far = np.abs(self.near(row, phi, rate)) > FLAT * np.abs(slope).max(axis=1)[row] if row.size else end
+        rows = row[far & ~end]
+        phi[far & ~end] = zeros(lambda k, x: self.near(rows[k], x, rate), left[far & ~end], right[far & ~end])
         rows = row[end]
         phi[end] = zeros(lambda k, x: np.where(self.near(rows[k], x, rate) == 0.0, -1.0, 1.0), left[end], right[end])
         return CrankAngles(row, phi)
