@@ -61,7 +61,7 @@ def _column(name: str, designs: Array) -> Array:
 
 
 def _may_part(designs: Array) -> Array:
-    """Whether link or heddle rod may fail to reach where the rod does: not with a parallel linkage and a long rod."""
+    """Whether DF or EG may fail to reach where BC reaches: not in a parallelogram whose heddle rod is infinite."""
     arm, back, frame, link, rod = (_column(name, designs) for name in ("O3D", "O4F", "O3O4", "DF", "EG"))
     return (arm != back) | (frame != link) | (rod > 0.0)  # type: ignore[no-any-return]
 
