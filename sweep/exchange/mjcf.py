@@ -8,9 +8,8 @@ position of ``crank`` is phi, one of ``rocker`` psi, one of ``slider`` s.  Lengt
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
-from xml.etree import ElementTree as Xml
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
 from sweep.families.machines.machine import Machine
 from sweep.families.sites import TIP
+from sweep.pages import rendered
 
 METRES = {"mm": 1e-3, "m": 1.0}
 LEAST = "2e-15"  # kg, kg m^2: MuJoCo refuses 1e-15 or less, as bars of a mechanism below some 10 mm have
@@ -32,37 +32,8 @@ THICK = 0.008  # thickness of a bar, relative to the extent of all joints
 DRIVING = 1.0  # the finger is at the crank's end of the coupler
 
 
-@dataclass(frozen=True)
-class Loop:
-    """One stage in its first pose: joints, and the bodies' axes as columns x, y, z, all in metres.
-
-    Parameters
-    ----------
-    tag : suffix of names: member and number of the stage
-    follower : "rocker" or "slider"
-    A, B, C, D : joints; D is C on a slider
-    crank, coupler, driven : axes of the bodies, (3, 3); x along the link, z along its axis
-    finger : DRIVING or not
-    turn : rotation from the frame of the family's forces and gravity to that of its joints
-    shift : displacement of the stage beside others
-    """
-
-    tag: str
-    follower: str
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-    crank: Array
-    coupler: Array
-    driven: Array
-    finger: float
-    turn: Array
-    shift: Array
-
-
 def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, float], path: Path, unit: str) -> None:
-    """Write the model in its first pose.
+    """Write the model in its first pose; templates/mjcf.xml is its text.
 
     Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design,
     otherwise those of steel bars.  Stages of a chain are coupled at their common shaft, members of a machine to the
@@ -73,27 +44,19 @@ def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, fl
     InputError
         for a stage without crank, coupler and rocker or slider, or a mass without inertia.
     """
-    root = Xml.Element("mujoco", model=family.name)
-    Xml.SubElement(root, "compiler", angle="radian", inertiafromgeom="auto", boundmass=LEAST, boundinertia=LEAST)
-    option = Xml.SubElement(root, "option")
-    world, equality = Xml.SubElement(root, "worldbody"), Xml.SubElement(root, "equality")
     thick = THICK * extent([stage.part for stage in placed]) * METRES[unit]
+    stages = []
     for k, stage in enumerate(placed):
         part, before = stage.part, placed[k - 1].part if k else None
         columns = _of_member(design, part.member)
-        loop = _loop(stage, columns.get(f"finger{part.stage}", 0.0), METRES[unit])
-        _stage(world, equality, loop, part, columns, unit, thick)
-        if before is None:
-            gravity = np.array([columns.get(f"gravity_{axis}{part.stage}", 0.0) for axis in "xyz"])
-            option.set("gravity", words(loop.turn @ gravity * METRES[unit]))
-        elif before.member == part.member:
-            _geared(equality, f"crank{loop.tag}", f"rocker{_tag(before)}", columns.get(f"kappa{part.stage}", 1.0))
-        elif isinstance(family, Machine):
-            _geared(equality, f"crank{loop.tag}", *_driver(family, part.member, f"crank{_tag(placed[0].part)}"))
-    actuators = Xml.SubElement(root, "actuator")
-    Xml.SubElement(actuators, "motor", name="drive", joint=f"crank{_tag(placed[0].part)}")
-    Xml.indent(root)
-    path.write_text(Xml.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+        shaft: tuple[str, float] | None = None  # the joint that turns this stage's crank, and their ratio
+        if before is not None and before.member == part.member:
+            shaft = f"rocker{_tag(before)}", columns.get(f"kappa{part.stage}", 1.0)
+        elif before is not None and isinstance(family, Machine):
+            shaft = _driver(family, part.member, f"crank{_tag(placed[0].part)}")
+        stages.append(_stage(stage, columns, unit, 4.0 * thick) | {"shaft": shaft})
+    text = rendered("mjcf.xml", name=family.name, stages=stages, thick=thick, least=LEAST, words=words)
+    path.write_text(text, encoding="utf-8")
 
 
 def _tag(part: Part) -> str:
@@ -118,16 +81,14 @@ def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
     return " ".join(word for word in ("rocker", other, names.parts(output).stage) if word), float(member.ratio)
 
 
-def _geared(equality: Xml.Element, joint: str, other: str, ratio: float) -> None:
-    """Couple two joints from their positions in the first pose."""
-    Xml.SubElement(
-        equality, "joint", name=f"shaft of {joint}", joint1=joint, joint2=other,
-        polycoef=words(np.array([0.0, ratio, 0.0, 0.0, 0.0])),
-    )  # fmt: skip
+def _loop(placed: PlacedPart, finger: float, metres: float) -> tuple[list[Array], list[Array], Array, str]:
+    """Return a stage in its first pose, from its joint records.
 
-
-def _loop(placed: PlacedPart, finger: float, metres: float) -> Loop:
-    """Return the stage's joints and directions, from its joint records."""
+    Returns
+    -------
+    joints A, B, C, D [m], D is C on a slider; axes of crank, coupler and follower, (3, 3) each, x along the link and z
+    along its axis; rotation from the frame of the family's forces to that of its joints; "rocker" or "slider"
+    """
     part = placed.part
     records = part.family.find(JointRecords)
     if records is None:
@@ -146,16 +107,10 @@ def _loop(placed: PlacedPart, finger: float, metres: float) -> Loop:
     # The records start at the crank's axis, the joints in the frame of the family.
     crank = np.column_stack([rho_b, tau_b, u])
     turn = _triad(part.joints["b"][0] - part.joints["a"][0], part.axes["a"]) @ crank.T
-    slider = records.follower == "slider"
-    a, b, c, d = (
-        (turn @ (point - center) + part.joints["a"][0] + placed.shift) * metres
-        for point in (center, pose[0:3], pose[3:6], pose[3:6] if slider else d)
-    )
+    points = (center, pose[0:3], pose[3:6], pose[3:6] if records.follower == "slider" else d)
+    joints = [(turn @ (point - center) + part.joints["a"][0] + placed.shift) * metres for point in points]
     coupler, driven = np.column_stack([s, np.cross(n, s), n]), np.column_stack([rho, tau, k])
-    return Loop(
-        _tag(part), records.follower, a, b, c, d,
-        turn @ crank, turn @ coupler, turn @ driven, finger, turn, placed.shift * metres,
-    )  # fmt: skip
+    return joints, [turn @ crank, turn @ coupler, turn @ driven], turn, records.follower
 
 
 def _triad(along: Array, axis: Array) -> Array:
@@ -164,68 +119,53 @@ def _triad(along: Array, axis: Array) -> Array:
     return np.column_stack([x, np.cross(axis, x), axis])
 
 
-def _stage(
-    world: Xml.Element, equality: Xml.Element, loop: Loop, part: Part, design: Mapping[str, float], unit: str,
-    thick: float,
-) -> None:  # fmt: skip
-    """Add crank, follower, and the coupler on one of them; x of a body is along its link, z along its axis."""
-    tag, follower = loop.tag, loop.follower
-    a, b, c = (float(np.linalg.norm(end)) for end in (loop.B - loop.A, loop.C - loop.B, loop.C - loop.D))
-    crank = _body(world, f"crank{tag}", loop.A, loop.crank)
-    Xml.SubElement(crank, "joint", name=f"crank{tag}", type="hinge", axis="0 0 1", ref=repr(float(part.crank[0])))
-    driven = _body(world, f"{follower}{tag}", loop.D, loop.driven)
+def _stage(placed: PlacedPart, design: Mapping[str, float], unit: str, slider: float) -> dict[str, Any]:
+    """Return a stage as the template writes it: crank, coupler and follower, each a body with its sites.
+
+    The coupler is on the body that carries its finger; ``slider`` is the length of one that is drawn [m].
+    """
+    part, metres = placed.part, METRES[unit]
+    finger = design.get(f"finger{part.stage}", 0.0)
+    (a, b, c, d), (crank, coupler, driven), turn, follower = _loop(placed, finger, metres)
+    driving = finger == DRIVING
+    origin, axes = (a, crank) if driving else (d, driven)
     position = float(part.position[0])
     if follower == "slider":
-        ref = repr(position * METRES[unit])
-        Xml.SubElement(driven, "joint", name=f"slider{tag}", type="slide", axis="0 1 0", ref=ref)
-    else:
-        if not part.family.pose_output[part.family.position].wraps:
-            position = float(np.arctan2(*(loop.C - loop.D)[[1, 0]]))  # the guide's position is that of its point
-        Xml.SubElement(driven, "joint", name=f"rocker{tag}", type="hinge", axis="0 0 1", ref=repr(position))
-    carries = crank if loop.finger == DRIVING else driven
-    origin, axes = (loop.A, loop.crank) if loop.finger == DRIVING else (loop.D, loop.driven)
-    cross = loop.coupler.T @ (loop.crank[:, 2] if loop.finger == DRIVING else loop.driven[:, 0])
-    coupler = _body(carries, f"coupler{tag}", axes.T @ (loop.B - origin), axes.T @ loop.coupler)
-    hinge = words(np.array([0.0 if loop.finger == DRIVING else b, 0.0, 0.0]))
-    Xml.SubElement(coupler, "joint", name=f"finger{tag}", type="hinge", pos=hinge, axis=words(cross))
-    Xml.SubElement(coupler, "joint", name=f"coupler{tag}", type="hinge", pos=hinge, axis="0 0 1")
-    first, second, anchor, joint = (
-        (f"coupler{tag}", f"{follower}{tag}", b, "C")
-        if loop.finger == DRIVING
-        else (f"crank{tag}", f"coupler{tag}", a, "B")
-    )
-    Xml.SubElement(
-        equality, "connect", name=f"{joint}{tag}", body1=first, body2=second,
-        anchor=words(np.array([anchor, 0.0, 0.0])),
-    )  # fmt: skip
-    lengths = {"crank": a, "coupler": b, follower: c if follower == "rocker" else 4.0 * thick}
-    for body, name in ((crank, "crank"), (coupler, "coupler"), (driven, follower)):
-        if f"m_{name}{part.stage}" in design:
-            body.append(inertial(design, name, part.stage, unit, lengths[name]))
-        Xml.SubElement(
-            body, "geom", name=f"{name}{tag}", type="capsule", size=repr(thick), density="7850", contype="0",
-            conaffinity="0", fromto=words(np.array([0.0, 0.0, 0.0, lengths[name], 0.0, 0.0])),
-        )  # fmt: skip
-    frames = {
-        "crank": (crank, loop.A, loop.crank), "coupler": (coupler, loop.B, loop.coupler),
-        follower: (driven, loop.D, loop.driven),
-    }  # fmt: skip
+        position *= metres
+    elif not part.family.pose_output[part.family.position].wraps:
+        position = float(np.arctan2(*(c - d)[[1, 0]]))  # the guide's position is that of its point
+    frames = {"crank": (a, crank), "coupler": (b, coupler), follower: (d, driven)}
+    sites: dict[str, dict[str, Array]] = {name: {} for name in (*frames, "")}
     for joint, path in part.joints.items():
-        links = (link.name for link in part.links if joint in link.joints)
-        link = next(links, follower if joint == TIP else "")
-        body, origin, axes = frames.get(link, (world, np.zeros(3), np.eye(3)))
-        at = axes.T @ (path[0] * METRES[unit] + loop.shift - origin)
-        Xml.SubElement(body, "site", name=f"{shown_name(joint)}{tag}", pos=words(at))
-
-
-def _body(parent: Xml.Element, name: str, at: Array, frame: Array) -> Xml.Element:
-    axes = np.concatenate([frame[:, 0], frame[:, 1]])
-    return Xml.SubElement(parent, "body", name=name, pos=words(at), xyaxes=words(axes))
+        link = next((link.name for link in part.links if joint in link.joints), follower if joint == TIP else "")
+        body = link if link in frames else ""
+        at, frame = frames.get(body, (np.zeros(3), np.eye(3)))
+        sites[body][shown_name(joint)] = frame.T @ ((path[0] + placed.shift) * metres - at)
+    lengths = [float(np.linalg.norm(end)) for end in (b - a, c - b, c - d)]
+    frames["coupler"] = axes.T @ (b - origin), axes.T @ coupler
+    bodies = {}
+    for (name, (at, frame)), size in zip(frames.items(), lengths, strict=True):
+        length = slider if name == "slider" else size
+        masses = inertial(design, name, part.stage, unit, length) if f"m_{name}{part.stage}" in design else None
+        bodies[name] = {
+            "name": name,
+            "at": at,
+            "axes": frame,
+            "length": length,
+            "inertial": masses,
+            "sites": sites[name],
+        }
+    return {
+        "tag": _tag(part), "driving": driving, "phi": float(part.crank[0]), "position": position, "sites": sites[""],
+        "crank": bodies["crank"], "coupler": bodies["coupler"], "driven": bodies[follower],
+        "hinge": 0.0 if driving else lengths[1], "cross": coupler.T @ (crank[:, 2] if driving else driven[:, 0]),
+        "gravity": turn @ np.array([design.get(f"gravity_{axis}{part.stage}", 0.0) for axis in "xyz"]) * metres,
+    }  # fmt: skip
 
 
 def words(values: Array) -> str:
     """Return numbers in MuJoCo's format, to the last bit."""
-    return " ".join(repr(float(x)) for x in values)
+    return " ".join(repr(float(x)) for x in np.ravel(values))
 
 
 KILOGRAMS = {"mm": 1e3, "m": 1.0}  # masses of designs in mm are tonnes, as N and s want
@@ -248,7 +188,7 @@ def _own(design: Mapping[str, float], name: str, stage: str, length: float) -> t
     return float(columns[0, 0]), columns[0, 1:4], columns[0, 4:]
 
 
-def inertial(design: Mapping[str, float], name: str, stage: str, unit: str, length: float) -> Xml.Element:
+def inertial(design: Mapping[str, float], name: str, stage: str, unit: str, length: float) -> dict[str, Any]:
     """Return mass, centre and inertia of a body; ``length`` [m] is that between its joints.
 
     A body about a fixed axis rotates by its moment about that axis and its products with it alone, a slider does not
@@ -280,7 +220,5 @@ def inertial(design: Mapping[str, float], name: str, stage: str, unit: str, leng
             f"j_{name}_xx{stage}", f"principal moments {low:.3g}, {middle:.3g}, {high:.3g}", allowed, "export"
         )
     scale = kilograms * metres**2
-    return Xml.Element(
-        "inertial", pos=words(centre * metres), mass=repr(mass * kilograms),
-        fullinertia=words(np.array([xx, yy, zz, xy, xz, yz]) * scale),
-    )  # fmt: skip
+    tensor = np.array([xx, yy, zz, xy, xz, yz]) * scale
+    return {"mass": mass * kilograms, "centre": centre * metres, "tensor": tensor}
