@@ -29,6 +29,7 @@ from kernels.effects.friction import (
     unit_vector,
 )
 from kernels.effects.link_loads import (
+    BODY_OF,
     CONTACT,
     FREEDOM,
     GUIDE,
@@ -51,7 +52,7 @@ from kernels.effects.link_loads import (
     solve,
 )
 from kernels.jit import inline, kernel
-from kernels.linkage.bodies import DRIVEN, Links, Moving, latter, moving, posed, put_wrench, vector, velocity_at
+from kernels.linkage.bodies import DRIVEN, SLIDE, Links, Moving, latter, moving, posed, put_wrench, vector, velocity_at
 from kernels.types import Array, Status
 
 MU, RADIUS, THRUST, FIRST, SECOND, PER_FRICTION = 0, 1, 2, 3, 4, 5
@@ -85,6 +86,17 @@ def _lever(kind: int, data: Array) -> float:
 
 
 @inline
+def _allowed(links: Links, i: int, k: int, body: int, slip: Vector) -> Vector:
+    """Part of a body's sliding on its parent along the ways that it has: two for the block of a fork, else one."""
+    found = (0.0, 0.0, 0.0)
+    for which in range(links.freedoms.shape[1]):
+        way = vector(links.axes[i, k, which])
+        own = links.freedoms[i, which, 0] == body and links.freedoms[i, which, 1] == SLIDE
+        found = mix(1.0, found, dot(slip, way) if own else 0.0, way)
+    return found
+
+
+@inline
 def direction(
     links: Links, i: int, k: int, joint: Index, ends: Index, place: Vector, data: Array, speed: float
 ) -> tuple[Vector, Vector, float]:
@@ -102,7 +114,7 @@ def direction(
         slip = _moved(velocity_at(one, place), velocity_at(two, place))
     # Sliding that the joint does not allow is rounding; next to a reversal it would be a share of the true sliding.
     if kind == GUIDE:
-        slip = scale(dot(slip, axis), axis)
+        slip = _allowed(links, i, k, joint[BODY_OF], slip)
     for which in range(joint[LINE], joint[LINE] + joint[LINES]):
         across = latter(lines[which])
         slip = mix(1.0, slip, -dot(slip, across), across)

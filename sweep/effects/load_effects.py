@@ -13,6 +13,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.effects.coupler import CouplerMotion, coupler_point
+from kernels.linkage.bodies import SLIDE
 from sweep.effects import kinetostatics, link_loads, loads
 from sweep.effects.base import Advice, Effect, largest
 from sweep.effects.link_loads import rod, tree_of
@@ -59,12 +60,20 @@ def slowness(scene: Scene) -> Array:
         if joint.kind == "sleeve":
             axis = axis_of(scene, joint)
             radius = scene.inputs[f"radius_{joint.name}"][:, None]
-            squares.append((radius * (turn * axis).sum(axis=2)) ** 2 + (slip * axis).sum(axis=2) ** 2)
+            squares.append((radius * (turn * axis).sum(axis=2)) ** 2 + _slid(scene, joint.body, slip))
             continue
         squares.append((turn * turn).sum(axis=2))
         if joint.kind == "contact":
             squares.append((slip * slip).sum(axis=2))
     return np.stack(squares, axis=2)
+
+
+def _slid(scene: Scene, body: int, slip: Array) -> Array:
+    """Square of the sliding along the ways that a body has on its parent, (n, m); the block of a fork has two."""
+    own = (scene.links.freedoms == (body, SLIDE)).all(axis=2)[:, None, :]
+    along = np.einsum("nmx,nmdx->nmd", slip, scene.links.axes)
+    found: Array = np.where(own, along**2, 0.0).sum(axis=2)
+    return found
 
 
 def axis_of(scene: Scene, joint: LinkJoint) -> Array:

@@ -269,6 +269,19 @@ def test_a_collar_rubs_where_the_friction_radius_of_its_shaft_is_zero():
     assert both[0]["lost_torque_a"].min() > 0.0
 
 
+def test_the_block_of_a_fork_rubs_along_the_slot_and_along_the_driven_axis():
+    """The block slides by rho' along the slot and by the ball's height; friction opposes both, with the joint's load.
+
+    The height comes from public poses and the Fourier transform, as in the other tests, so 1e-12 of the loss.
+    """
+    names = ["lost_torque_c", "load_support_c1", "load_support_c2", "drho", "z_b"]
+    _, _, poses = turn("slotted fork", rubbing("slotted", 0.05) | {"radius_c": 0.0}, names)
+    along, height = poses["drho"].to_numpy(), derivative(poses["z_b"].to_numpy())
+    lost = 0.05 * (poses["load_support_c1"] + poses["load_support_c2"]) * np.hypot(along, height)
+    np.testing.assert_allclose(poses["lost_torque_c"], lost, atol=1e-12 * lost.max())
+    assert np.abs(height).max() > 0.3 * np.abs(along).max()  # of the same size: neither may be left out
+
+
 def test_a_tenth_of_a_percent_of_the_tool_is_seen():
     _, d, poses = turn("spherical_looper", {"m_tool": 0.8008}, vectors("spherical_looper"))
     found, joints, _, _ = needed("spherical_looper", poses, d)
