@@ -12,7 +12,7 @@ from functools import lru_cache, partial
 from importlib import import_module
 from types import MappingProxyType
 
-from sweep.effects.base import CURVED, Effect, PlacedEffect
+from sweep.effects.base import CURVED, REGISTER, Effect, PlacedEffect
 from sweep.effects.evaluation import Added, bent, effect_poses, features, on_own_columns, run_design
 from sweep.errors import InputError
 from sweep.families.base import Accuracy, Family, Output, Parameter, Step, Work, of_family
@@ -23,68 +23,14 @@ from sweep.families.names import at_stage, stem
 from sweep.families.reduction import reduced
 from sweep.numerics.curves import Curve
 
-# Module and constant of each effect's entry.  A new effect is a kernel file, an entry file and its line here.
-_ENTRIES = {
-    "pressure": ("pressure", "EFFECT"),
-    "pressure_extrema": ("pressure", "EXTREMA_EFFECT"),
-    "coupler": ("motion", "EFFECT"),
-    "shaking": ("motion", "SHAKING_EFFECT"),
-    "kinetostatics": ("load_effects", "KINETOSTATICS"),
-    "slider_kinetostatics": ("load_effects", "SLIDER_KINETOSTATICS"),
-    "friction": ("load_effects", "CLOSED_FRICTION"),
-    "slider_friction": ("load_effects", "SLIDER_FRICTION"),
-    "speed_fluctuation": ("speed", "EFFECT"),
-    "slider_speed_fluctuation": ("speed", "SLIDER"),
-    "speed_fluctuation_friction": ("speed", "RUBBING_EFFECT"),
-    "slider_speed_fluctuation_friction": ("speed", "RUBBING_SLIDER"),
-    "sliding_bearings": ("bearings", "SLIDING"),
-    "rolling_bearings": ("bearings", "ROLLING"),
-    "sliding_limits": ("bearings", "SLIDING_LIMIT"),
-    "rolling_limits": ("bearings", "ROLLING_LIMIT"),
-    "bearing_life": ("bearing_life", "EFFECT"),
-    "elasticity": ("elasticity", "STATIC"),
-    "slider_elasticity": ("elasticity", "SLIDER_STATIC"),
-    "dynamic_elasticity": ("elasticity", "DYNAMIC"),
-    "slider_dynamic_elasticity": ("elasticity", "SLIDER_DYNAMIC"),
-    "tool": ("tool", "EFFECT"),
-    "tip_tool": ("tool", "TIP"),
-    "thread_contour": ("thread", "CONTOUR"),
-    "thread_speed": ("thread", "SPEED"),
-    "capstan": ("thread", "CAPSTAN"),
+# By name: entry of the effect, module and constant, or module and function, with the family that it is made for.
+_ENTRIES: dict[str, tuple[str, str]] = {name: (table["entry"], "") for name, table in REGISTER["effects"].items()}
+_ENTRIES |= {
+    f"{family}_{kind}": (table["entry"], family)
+    for kind, table in REGISTER["of_families"].items()
+    for family in table["families"]
 }
-# Effects of every family with a tree of links: module, and the function that makes the entry from the family's name.
-_OF_TREES = {
-    "loads": ("load_effects", "loads_of"),
-    "friction": ("load_effects", "friction_of"),
-    "sliding_bearings": ("link_bearings", "sliding_of"),
-    "rolling_bearings": ("link_bearings", "rolling_of"),
-    "speed_fluctuation": ("speed", "of_tree"),
-    "speed_fluctuation_friction": ("speed", "rubbing_tree"),
-}
-_TREES = ("five_link", "slotted", "swivel", "spherical_looper", "cylindrical_looper")
-# Families whose joints are not dimensioned here: forces and speed, no friction and no bearings.
-_PLAIN_TREES = (
-    "inverted_slider_crank",
-    "geared_dwell",
-    "epicyclic_dwell",
-    "cam",
-    "cam_lever",
-    "eyelet",
-    "guided_cam",
-    "free_cam",
-    "heddle",
-    "feed",
-    "feed_triad",
-)
-_SLOTS = ("slotted", "inverted_slider_crank", "geared_dwell", "epicyclic_dwell", "feed")
-_MADE = {
-    f"{tree}_{kind}": (tree, *made)
-    for kind, made in _OF_TREES.items()
-    for tree in (*_TREES, *(_PLAIN_TREES if kind in ("loads", "speed_fluctuation") else ()))
-}
-_MADE |= {f"{name}_contact": (name, "contact", "contact_of") for name in _SLOTS}
-_MADE |= {f"{name}_roller": (name, "cam_roller", "roller_of") for name in ("cam", "cam_lever")}
-NAMES = (*_ENTRIES, *_MADE)
+NAMES = tuple(_ENTRIES)
 
 # In later stages, speed and acceleration are those of the first stage's crank.
 _FIRST_ONLY = ("speed", "speed_change")
@@ -97,9 +43,10 @@ NO_CURVES: Mapping[str, Curve] = MappingProxyType({})
 @lru_cache
 def effect(name: str) -> Effect:
     """Look up an effect's entry in the register."""
-    tree, module, attribute = _MADE.get(name) or ("", *_ENTRIES[name])
+    place, of = _ENTRIES[name]
+    module, _, attribute = place.partition(".")
     found = getattr(import_module(f"sweep.effects.{module}"), attribute)
-    entry: Effect = found(tree) if tree else found
+    entry: Effect = found(of) if of else found
     return entry
 
 
@@ -107,9 +54,9 @@ def effect(name: str) -> Effect:
 def serving(family: Family) -> tuple[Effect, ...]:
     """Effects whose requirements a family meets, in the order of the register.
 
-    Entries of other families' trees of links are not made for it.
+    Effects that are made for other families are not made for it.
     """
-    found = (effect(name) for name in NAMES if name not in _MADE or _MADE[name][0] == family.name)
+    found = (effect(name) for name, (_, of) in _ENTRIES.items() if of in ("", family.name))
     return tuple(entry for entry in found if entry.serves(family))
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TypeAlias
+from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -18,6 +20,27 @@ from sweep.families.capabilities import JointRecords, OutputLink, ToolPoint
 from sweep.families.curve_features import Bends
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import ends_in_digit
+
+REGISTER: Mapping[str, Mapping[str, Mapping[str, Any]]] = tomllib.loads(
+    Path(__file__).parent.with_suffix(".toml").read_text(encoding="utf-8")
+)
+_TEXTS = ("key", "title", "equation", "called_for", "negligible")
+
+
+def about(kind: str, family: str = "") -> dict[str, Any]:
+    """Return the name and the texts of an effect in the register, as arguments of :class:`Effect`.
+
+    ``family`` is the name of the only family with the effect, if it is one of those that are made for each of some.
+    """
+    table = REGISTER["of_families" if family else "effects"][kind]
+    texts = about(table["as"]) if "as" in table else {}
+    texts |= {key: table[key] for key in _TEXTS if key in table}
+    if "formulas" in table:
+        texts["formulas"] = tuple(table["formulas"].splitlines())
+    if family:
+        return texts | {"name": f"{family}_{kind}", "title": f"{texts['title']}: {find_family(family).title}"}
+    return texts | {"name": kind}
+
 
 ON_LINE, ON_COUPLER, ON_TIP = 0, 1, 2  # places of a tool, in the order of Effect.tool_inputs
 
@@ -102,8 +125,9 @@ def tool_place(family: Family) -> int | None:
 
 @dataclass(frozen=True)
 class Effect:
-    """Entry of the register; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
+    """An effect; ``compute(scene, wanted)`` returns the wanted outputs (n, m) and ``status`` (n, m).
 
+    Outputs without an equation have that of the effect.
     ``whole_turn`` effects couple different crank angles: they sample the turn themselves, whatever poses are wanted.
     ``even_crank`` effects need a crank that turns evenly, so later stages of a chain do not have them. ``takes_load``
     is the key of the effect that returns the load of a chain's later stages; without it their load is ignored.
@@ -146,6 +170,15 @@ class Effect:
     only_for: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     bends: tuple[Bends, ...] = ()
     rates: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        whole = self.design_result
+        object.__setattr__(self, "outputs", self._stated(self.outputs))
+        if whole is not None:
+            object.__setattr__(self, "design_result", replace(whole, outputs=self._stated(whole.outputs)))
+
+    def _stated(self, outputs: tuple[Output, ...]) -> tuple[Output, ...]:
+        return tuple(o if o.equation else replace(o, equation=self.equation) for o in outputs)
 
     def inputs_of(self, family: Family) -> tuple[Parameter, ...]:
         """List the inputs for a family, with those of a tool if the family has a place for one."""

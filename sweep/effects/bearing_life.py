@@ -12,7 +12,7 @@ from kernels import status as st
 from kernels.effects.bearings import bearing_loads
 from kernels.types import EPS, TWO_PI, Status
 from sweep.effects import loads
-from sweep.effects.base import DesignResult
+from sweep.effects.base import DesignResult, about
 from sweep.effects.bearings import CATALOGUE, SUPPORTS
 from sweep.effects.load_effects import KINETOSTATICS
 from sweep.effects.load_passing import reactions
@@ -27,11 +27,6 @@ from sweep.numerics.quadrature import integrate
 from sweep.numerics.records import Indices
 from sweep.numerics.singularities import crowded, singularities, turn_edges
 
-FORMULAS = (
-    "(1) F2 = (M x k - z1 F_r)/(z2 - z1), F1 = F_r - F2 from force F and moment M on the shaft; F_r across its axis k",
-    "(2) P_m = (integral of P^p |w| d phi/integral of |w| d phi)^(1/p), w the shaft's turning per crank angle, ours",
-    "(3) life = 10^6 (C/P_m)^p turns; the shaft's travel counts in full turns, ours",
-)
 PANEL = 1.0  # length of the first panels of a turn relative to the distance of the nearest singularity
 LOOK = 1.0 / 16.0  # spacing of the poses that bracket kinks and jumps, relative to that distance
 SIZING = 64  # poses that determine the size of the loads, so that no power of a load overflows
@@ -44,7 +39,7 @@ def load_names(shaft: str) -> tuple[str, ...]:
     return f"{radial}1", f"{radial}2", f"axial_load_{shaft}", f"{equivalent}1", f"{equivalent}2"
 
 
-def load_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
+def load_outputs(shaft: str, text: str) -> tuple[Output, ...]:
     """List the loads of a shaft's two bearings; ``text`` names the shaft.
 
     An equivalent load jumps where the axial load exceeds e_limit.
@@ -54,21 +49,21 @@ def load_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
         "equivalent load of rolling bearing 2",
     )  # fmt: skip
     return tuple(
-        Output(name, "force", f"{one}, from the joint reactions: {text}", equation, kinks="equivalent" in one)
+        Output(name, "force", f"{one}, from the joint reactions: {text}", kinks="equivalent" in one)
         for name, one in zip(load_names(shaft), words, strict=True)
     )
 
 
-def turn_outputs(shaft: str, text: str, equation: str) -> tuple[Output, ...]:
+def turn_outputs(shaft: str, text: str) -> tuple[Output, ...]:
     """Mean loads and lives of a shaft's two bearings."""
     return tuple(
         o
         for k in "12"
         for o in (
             Output(f"mean_load_{shaft}{k}", "force", f"load of equal effect over the turn, by travel: {text}, bearing "
-                   f"{k}", equation),
+                   f"{k}"),
             Output(f"life_{shaft}{k}", "time", f"running time that 90 % of bearings {k} of {text} reach; travel "
-                   "counted as turns", equation),
+                   "counted as turns"),
         )
     )  # fmt: skip
 
@@ -263,23 +258,17 @@ def _refined(
 ROCKER = BearingShaft(
     "d", "", (9, 15), lambda scene: scene.records[1][:, None, 3:6], lambda scene: scene.records[0][:, :, 22]
 )
-_TEXT, _EQUATION = "the rocker's bearings", "B2 (1)-(3)"
+_TEXT = "the rocker's bearings"
 
 EFFECT = replace(
     KINETOSTATICS,
-    key="B2",
-    name="bearing_life",
-    title="rolling bearings of the rocker under the joint reactions: loads, mean load over the turn, life",
-    equation=_EQUATION,
-    formulas=FORMULAS,
+    **about("bearing_life"),
     needs=("kinetostatics",),
     inputs=(*loads.ROCKER.parameters, *SUPPORTS, *CATALOGUE),
-    outputs=load_outputs("d", _TEXT, _EQUATION),
+    outputs=load_outputs("d", _TEXT),
     compute=ROCKER.loads,
-    called_for="life of the rocker's bearings",
-    negligible="sliding bearings; elsewhere never, the life is what is asked for",
     even_crank=True,
     advise=None,
     bends=bends(ROCKER),
-    design_result=DesignResult(turn_outputs("d", _TEXT, _EQUATION), partial(per_turn, shaft=ROCKER), BLOCK),
+    design_result=DesignResult(turn_outputs("d", _TEXT), partial(per_turn, shaft=ROCKER), BLOCK),
 )

@@ -9,23 +9,13 @@ from functools import partial
 import numpy as np
 
 from kernels.effects import bearings, permissible
-from sweep.effects.base import ComputeFunction, Effect, largest
+from sweep.effects.base import ComputeFunction, Effect, about, largest
 from sweep.effects.loads import SPEED, together
 from sweep.effects.pressure import components
 from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Output, Parameter
 from sweep.families.curve_features import Bends
 from sweep.families.poses import filled_all, filled_each
-
-EQUATION = "B1 (1)-(4)"
-FORMULAS = (
-    "(1) Pi1 = hypot(z2 cos theta1, z2 sin theta1 + c x), Pi2 the same with z1, x = sin theta1 tan theta2",
-    "(2) P = M/h, h = c cos theta1 - mu [k_j d (Pi1 + Pi2)/(2 L) + r_t |x|], L = |z2 - z1|; h <= 0 is self-locking",
-    "(3) journals p_i = P Pi_i/(L d l_i), collar p_3 = 4 P |x|/(pi (d0^2 - d^2));",
-    "    permissible theta1: first crossing of max p_i/p_i,adm = 1",
-    "(4) rolling: P_eq = K V R if F_a <= e V R else K (X V R + Y F_a); permissible P_eq = C (60 n L_h/10^6)^(-1/p),",
-    "    n the speed of the crank [rpm]: an oscillating rocker counts as one that turns with it",
-)
 
 SUPPORTS = (
     Parameter("support_d1", "length", "first support along the rocker axis, from D, the plane of C"),
@@ -45,10 +35,10 @@ SLIDING_INPUTS = (
     Parameter("mu_d", "ratio", "coefficient of friction of the rocker bearing", not_negative=True),
 )
 SLIDING_OUTPUTS = (
-    *(Output(f"journal_load{k}", "force", f"radial load of journal {k}", EQUATION) for k in (1, 2)),
-    Output("thrust_load", "force", "axial load of the collar", EQUATION),
-    *(Output(f"journal_pressure{k}", "pressure", f"mean pressure of journal {k}", EQUATION) for k in (1, 2)),
-    Output("collar_pressure", "pressure", "mean pressure of the collar", EQUATION),
+    *(Output(f"journal_load{k}", "force", f"radial load of journal {k}") for k in (1, 2)),
+    Output("thrust_load", "force", "axial load of the collar"),
+    *(Output(f"journal_pressure{k}", "pressure", f"mean pressure of journal {k}") for k in (1, 2)),
+    Output("collar_pressure", "pressure", "mean pressure of the collar"),
 )
 CATALOGUE = (
     Parameter("rotation_factor", "ratio", "V of the bearing catalogue", default=1.0, positive=True),
@@ -62,8 +52,8 @@ CATALOGUE = (
 )
 ROLLING_INPUTS = (*_COMMON, *CATALOGUE)
 ROLLING_OUTPUTS = (
-    *(Output(f"equivalent_load{k}", "force", f"equivalent load of rolling bearing {k}", EQUATION) for k in (1, 2)),
-    *(Output(f"life{k}", "1", f"L10 of bearing {k} at this load, in 10^6 turns", EQUATION) for k in (1, 2)),
+    *(Output(f"equivalent_load{k}", "force", f"equivalent load of rolling bearing {k}") for k in (1, 2)),
+    *(Output(f"life{k}", "1", f"L10 of bearing {k} at this load, in 10^6 turns") for k in (1, 2)),
 )
 
 
@@ -75,16 +65,14 @@ PERMISSIBLE = (
 REQUIRED_LIFE = Parameter("required_life", "time", "running time that 90 % of the bearings must reach", positive=True)
 LIFE = (REQUIRED_LIFE, SPEED)
 SLIDING_LIMITS = (
-    Output("sliding_utilisation", "1", "largest bearing pressure over its permissible value", EQUATION),
-    Output("permissible_theta1", "rad", "largest radial pressure angle the sliding bearings permit", EQUATION),
-    Output("theta1_reserve", "rad", "permissible minus actual radial pressure angle, sliding bearings", EQUATION),
+    Output("sliding_utilisation", "1", "largest bearing pressure over its permissible value"),
+    Output("permissible_theta1", "rad", "largest radial pressure angle the sliding bearings permit"),
+    Output("theta1_reserve", "rad", "permissible minus actual radial pressure angle, sliding bearings"),
 )
 ROLLING_LIMITS = (
-    Output("rolling_utilisation", "1", "larger equivalent load over the permissible one", EQUATION),
-    Output("permissible_theta1_rolling", "rad", "largest radial pressure angle the rolling bearings permit", EQUATION),
-    Output(
-        "theta1_reserve_rolling", "rad", "permissible minus actual radial pressure angle, rolling bearings", EQUATION
-    ),
+    Output("rolling_utilisation", "1", "larger equivalent load over the permissible one"),
+    Output("permissible_theta1_rolling", "rad", "largest radial pressure angle the rolling bearings permit"),
+    Output("theta1_reserve_rolling", "rad", "permissible minus actual radial pressure angle, rolling bearings"),
 )
 
 
@@ -147,22 +135,16 @@ def permissible_load(scene: Scene, tail: str = "") -> Array:
 
 
 def _effect(
-    name: str, title: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
+    name: str, inputs: tuple[Parameter, ...], results: tuple[Output, ...], compute: ComputeFunction,
     bends: tuple[Bends, ...], kind: str = "",
 ) -> Effect:  # fmt: skip
     return Effect(
-        key="B1",
-        name=name,
-        title=title,
-        equation=EQUATION,
-        formulas=FORMULAS,
+        **about(name),
         followers=("rocker",),
         needs=("pressure",),
         inputs=inputs,
         outputs=tuple(replace(o, kinks=True) for o in results),  # magnitudes, and the larger of several
         compute=compute,
-        called_for="bearing choice while the linkage is being synthesised",
-        negligible="other members govern: utilisation below 0.5",
         even_crank=SPEED in inputs,
         least=tuple(o.name for o in results if o.name.startswith(("life", "permissible", "theta1_reserve"))),
         bends=bends,
@@ -182,20 +164,16 @@ def _bent(results: tuple[Output, ...], curves: Callable[[Scene], Array]) -> Bend
 
 
 SLIDING = _effect(
-    "sliding_bearings", "sliding bearings of the rocker: loads and mean pressures, massless estimate",
-    SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, (_bent(SLIDING_OUTPUTS, _thrust),),
+    "sliding_bearings", SLIDING_INPUTS, SLIDING_OUTPUTS, _SLIDING, (_bent(SLIDING_OUTPUTS, _thrust),),
 )  # fmt: skip
 ROLLING = _effect(
-    "rolling_bearings", "rolling bearings of the rocker: equivalent loads and lives, massless estimate",
-    ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, (_bent(ROLLING_OUTPUTS, _formula),),
+    "rolling_bearings", ROLLING_INPUTS, ROLLING_OUTPUTS, _ROLLING, (_bent(ROLLING_OUTPUTS, _formula),),
 )  # fmt: skip
 SLIDING_LIMIT = _effect(
-    "sliding_limits", "utilisation of the sliding bearings and the pressure angle they permit",
-    (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS,
+    "sliding_limits", (*SLIDING_INPUTS, *PERMISSIBLE), SLIDING_LIMITS, _SLIDING_LIMITS,
     (_bent(SLIDING_LIMITS[:1], _thrust), _bent(SLIDING_LIMITS[1:], _eased)), "sliding",
 )  # fmt: skip
 ROLLING_LIMIT = _effect(
-    "rolling_limits", "utilisation of the rolling bearings and the pressure angle they permit",
-    (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS,
+    "rolling_limits", (*ROLLING_INPUTS, *LIFE), ROLLING_LIMITS, _ROLLING_LIMITS,
     (_bent(ROLLING_LIMITS[:1], _formula), _bent(ROLLING_LIMITS[1:], _eased)), "rolling",
 )  # fmt: skip

@@ -10,28 +10,20 @@ from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import Array
-from sweep.effects.base import Effect, largest
+from sweep.effects.base import Effect, about, largest
 from sweep.effects.contact import MODULUS, line_stress
 from sweep.effects.load_effects import loads_of
 from sweep.effects.load_passing import compute_loads
 from sweep.effects.scene import Scene, take_over
-from sweep.families import family
 from sweep.families.base import Columns, Output, Parameter, floats
 from sweep.families.curve_features import Bends
 
-EQUATION = "docs/cam.md (12)-(14)"
-FORMULAS = (
-    "(12) pitch curve z = R e^{-i phi}, R the roller's centre: kappa = -Im(conj z' z'')/|z'|^3, > 0 if convex",
-    "(13) undercut = kappa r, r the roller: the profile has no corner while it is below 1",
-    "    profile_curvature = kappa/(1 - kappa r): its largest value is 1 over the least radius of the profile",
-    "(14) stress_r = sqrt(F E* (profile_curvature + 1/r)/(pi l))",
-)
 ROLLER = Parameter("roller", "length", "radius of the roller", positive=True)
 LENGTH = Parameter("contact_length_r", "length", "length of the roller on the cam", positive=True)
 OUTPUTS = (
-    Output("undercut", "1", "curvature of the pitch curve times the roller; from 1 on it is undercut", EQUATION),
-    Output("profile_curvature", "1/length", "curvature of the cam's profile, positive where it is convex", EQUATION),
-    Output("stress_r", "pressure", "largest pressure between roller and cam (Hertz)", EQUATION, kinks=True),
+    Output("undercut", "1", "curvature of the pitch curve times the roller; from 1 on it is undercut"),
+    Output("profile_curvature", "1/length", "curvature of the cam's profile, positive where it is convex"),
+    Output("stress_r", "pressure", "largest pressure between roller and cam (Hertz)", kinks=True),
 )
 
 
@@ -88,18 +80,12 @@ def roller_of(name: str) -> Effect:
     bare = loads_of(name)
     return replace(
         bare,
-        key="C2",
-        name=f"{name}_roller",
-        title=f"undercutting, least radius and stress of the roller: {family(name).title}",
-        equation=EQUATION,
-        formulas=FORMULAS,
+        **about("roller", name),
         needs=(bare.name,),
         inputs=(*bare.inputs, ROLLER, LENGTH, MODULUS),
         only_for={p.name: ("stress_r",) for p in (*bare.inputs, LENGTH, MODULUS)},
         outputs=OUTPUTS,
         compute=compute,
         bends=(Bends(frozenset(("stress_r",)), normal_force, zero=True),),
-        called_for="a cam that can be made, wear of the roller",
-        negligible="a pitch curve whose least radius is far above the roller's",
         advise=largest(compute, "undercut", "undercut", 0.3),
     )

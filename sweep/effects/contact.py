@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.linkage.bodies import TURN
 from kernels.types import Array, Status
-from sweep.effects.base import Effect, largest
+from sweep.effects.base import Effect, about, largest
 from sweep.effects.link_loads import tree_of
 from sweep.effects.load_effects import axis_of, loads_of, relative
 from sweep.effects.load_passing import compute_loads
@@ -22,13 +22,6 @@ from sweep.families.curve_features import Bends
 from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.sites import AXES
 
-EQUATION = "docs/links.md (10)-(12)"
-FORMULAS = (
-    "(10) ball of radius R in a straight slot: p0 = (6 F E*^2/(pi^3 R^2))^(1/3), mean pressure p = 2 p0/3",
-    "(11) line contact of length l: p0 = sqrt(F E*/(pi l R)), p = pi p0/4; pin in a straight slot R = R1,",
-    "    strap on an eccentric 1/R = 1/R1 - 1/R2; p = F/(2 R1 l), and p0 where b = sqrt(4 F R/(pi l E*)) < R1/3",
-    "(12) p v: v the sliding speed, of a strap |omega relative| R1",
-)
 # Steel on steel; from both moduli 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2.
 MODULUS = Parameter("contact_modulus", "pressure", "E* of both surfaces: 1/E* = sum of (1 - nu^2)/E", default=115e3,
                     positive=True)  # fmt: skip
@@ -68,11 +61,9 @@ def _inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
 def _outputs(joint: LinkJoint) -> tuple[Output, ...]:
     name, text = joint.name, joint.text
     return (
-        Output(f"sliding_{name}", "length/time", f"sliding speed: {text}", EQUATION),
-        Output(f"stress_{name}", "pressure", f"largest pressure of the contact (Hertz): {text}", EQUATION, kinks=True),
-        Output(
-            f"pv_{name}", "pressure*length/time", f"mean pressure times sliding speed: {text}", EQUATION, kinks=True
-        ),
+        Output(f"sliding_{name}", "length/time", f"sliding speed: {text}"),
+        Output(f"stress_{name}", "pressure", f"largest pressure of the contact (Hertz): {text}", kinks=True),
+        Output(f"pv_{name}", "pressure*length/time", f"mean pressure times sliding speed: {text}", kinks=True),
     )
 
 
@@ -135,11 +126,7 @@ def contact_of(name: str) -> Effect:
     bare, joints = loads_of(name), touching(family(name).the(LinkTree))
     return replace(
         bare,
-        key="C1",
-        name=f"{name}_contact",
-        title=f"sliding speed, Hertz stress and p v of slots and straps: {family(name).title}",
-        equation=EQUATION,
-        formulas=FORMULAS,
+        **about("contact", name),
         needs=(bare.name,),
         inputs=(*bare.inputs, MODULUS, *(p for joint in joints for p in _inputs(joint))),
         only_for={p.name: tuple(o.name for o in _outputs(joint)) for joint in joints for p in _inputs(joint)},
@@ -150,7 +137,5 @@ def contact_of(name: str) -> Effect:
             for joint in joints
             if joint.touch != "strap"
         ),
-        called_for="wear and stress of slots, eccentrics, balls",
-        negligible="largest pressure below 100 MPa",
         advise=largest(compute, f"stress_{joints[0].name}", "pressure", 100.0, "MPa"),
     )

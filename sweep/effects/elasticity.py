@@ -10,7 +10,7 @@ from kernels import status as st
 from kernels.effects.elasticity import Steady, quasi_static, steady_state
 from kernels.types import Status
 from sweep.effects import loads
-from sweep.effects.base import Advice, DesignResult, Effect
+from sweep.effects.base import Advice, DesignResult, Effect, about
 from sweep.effects.driven import DrivenSide, driven_side
 from sweep.effects.load_passing import LOADS, behind
 from sweep.effects.loads import SPEED
@@ -19,18 +19,6 @@ from sweep.effects.turn import RESOLVED, at_poses, on_finer_grids, per_turn, red
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.poses import optional_outputs
 from sweep.numerics.even_grids import forwards
-
-EQUATION = "E1 (1), (2), (5), E2 (3)-(5)"
-FORMULAS = (
-    "(1) lag = (M - J omega^2 psi'')/(k p^2), p = c t_tau; elongation = p lag",
-    "(2) frequency ratio nu = sqrt(k/J) |p|/omega",
-    "(3) J omega^2 eta'' + h omega p^2 eta' + (k p^2 + h omega p p') eta = M - J omega^2 psi'', 2 pi periodic,",
-    "    by its Fourier coefficients; slider: J is the driven mass, c = 1, eta a length (ours)",
-    "(4) stable while the largest Floquet multiplier stays below 1, bounded at 1 (no damping); above 1, and where 1921",
-    "    samples of the turn do not resolve it, the steady state is not converged",
-    "(5) stages behind, or a tool at the rocker's tip, need a torque T(psi, psi', psi'') and have an inertia Jd(psi):",
-    "    T is taken off M, Jd added to J, omega^2 Jd_psi psi' to the factor of eta', T_psi to that of eta (ours)",
-)
 
 _SHARED = (
     Parameter("stiffness", "stiffness", "stiffness of the coupler along B-C", positive=True),
@@ -58,19 +46,19 @@ INPUTS = {
 
 def _static_outputs(kind: loads.Follower) -> tuple[Output, ...]:
     unit = "rad" if kind is loads.ROCKER else "length"
-    at_joint = Output("lag_displacement", "length", "the same at the joint C, c eta", EQUATION)
+    at_joint = Output("lag_displacement", "length", "the same at the joint C, c eta")
     return (
-        Output("lag", unit, f"quasi-static deflection of the {kind.name}, eta", EQUATION),
+        Output("lag", unit, f"quasi-static deflection of the {kind.name}, eta"),
         *((at_joint,) if kind is loads.ROCKER else ()),
-        Output("frequency_ratio", "1", "natural frequency over crank speed", EQUATION),
+        Output("frequency_ratio", "1", "natural frequency over crank speed"),
     )
 
 
 def _dynamic_outputs(kind: loads.Follower) -> tuple[Output, ...]:
     unit = "rad" if kind is loads.ROCKER else "length"
     return (
-        Output("lag_dynamic", unit, f"deflection of the {kind.name} in the periodic steady state", EQUATION),
-        Output("elongation_dynamic", "length", "elongation of the coupler in the periodic steady state", EQUATION),
+        Output("lag_dynamic", unit, f"deflection of the {kind.name} in the periodic steady state"),
+        Output("elongation_dynamic", "length", "elongation of the coupler in the periodic steady state"),
     )
 
 
@@ -78,7 +66,7 @@ def _dynamic_outputs(kind: loads.Follower) -> tuple[Output, ...]:
 _AT_TIP = ((), (), (*loads.TOOLS[2], *loads.GRAVITY))
 _KERNEL_NAMES = ("lag", "lag_displacement", "frequency_ratio")
 FLOQUET = Output(
-    "floquet", "1", "largest modulus of the Floquet multipliers; stable below 1, exactly 1 without damping", EQUATION
+    "floquet", "1", "largest modulus of the Floquet multipliers; stable below 1, exactly 1 without damping"
 )
 
 # Odd grids of the steady state: the next one is tried for designs that the previous one does not resolve.
@@ -258,11 +246,7 @@ def advise_dynamic(scene: Scene) -> Advice | None:
 
 def _static(kind: loads.Follower) -> Effect:
     return Effect(
-        key="E1",
-        name=f"{kind.prefix}elasticity",
-        title="quasi-static elasticity of the coupler",
-        equation=EQUATION,
-        formulas=FORMULAS,
+        **about(f"{kind.prefix}elasticity"),
         followers=(kind.name,),
         needs=("pressure",),
         inputs=INPUTS[kind.name],
@@ -272,8 +256,6 @@ def _static(kind: loads.Follower) -> Effect:
         outputs=_static_outputs(kind),
         least=("frequency_ratio",),
         compute=compute_static,
-        called_for="a fast machine, a precise meeting of hook and needle",
-        negligible="largest lag times the lever of the working point below the tolerance (1e-4 rad: 0.01 mm at 100 mm)",
         even_crank=True,
         advise=advise_static,
     )
@@ -283,16 +265,11 @@ def _dynamic(kind: loads.Follower) -> Effect:
     outputs = _dynamic_outputs(kind)
     return replace(
         _static(kind),
-        key="E2",
-        name=f"{kind.prefix}dynamic_elasticity",
-        title="periodic steady state of the elastic coupler and its stability",
+        **about(f"{kind.prefix}dynamic_elasticity"),
         needs=(f"{kind.prefix}elasticity",),
         outputs=outputs,
         least=(),
         compute=compute_dynamic,
-        called_for="max|lag''/nu^2|/max|lag| above a third of the tolerance",
-        negligible="max|lag''/nu^2|/max|lag| below 1/300 for a tolerance of 1 %; as a rule nu above 10 times the "
-        "harmonics",
         whole_turn=True,
         design_result=DesignResult((FLOQUET, *reduction_outputs(outputs)), turn),
         advise=advise_dynamic,

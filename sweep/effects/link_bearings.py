@@ -8,9 +8,8 @@ from functools import partial
 import numpy as np
 
 from kernels.effects.bearings import journal_pressures
-from sweep.effects.base import DesignResult, Effect
+from sweep.effects.base import DesignResult, Effect, about
 from sweep.effects.bearing_life import BLOCK, BearingShaft, load_outputs, turn_outputs
-from sweep.effects.bearing_life import FORMULAS as LIFE_FORMULAS
 from sweep.effects.bearing_life import bends as bends_of_shaft
 from sweep.effects.bearing_life import per_turn as turn_of_shaft
 from sweep.effects.bearings import CATALOGUE, REQUIRED_LIFE, permissible_load
@@ -24,17 +23,6 @@ from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, flo
 from sweep.families.link_tree import LinkJoint, LinkTree
 from sweep.families.poses import filled_all
 from sweep.families.sites import AXES
-
-EQUATION = "docs/links.md (13)-(16)"
-SLIDING_FORMULAS = (
-    "(13) journals p_k = F_k/(d l_k) with the loads F_k of the supports, friction included; a collar carries the force",
-    "    along the axis: p_3 = 4 |F_axial|/(pi (d0^2 - d^2)); utilisation = largest p over its permissible value",
-)
-ROLLING_FORMULAS = (
-    *LIFE_FORMULAS,
-    "(4) P = K V F if |F_axial| <= e V F else K (X V F + Y |F_axial|); permissible P = C (60 n L_h/10^6)^(-1/p),",
-    "    n the speed of the crank [rpm], whatever the shaft's own travel; lives count the travel",
-)
 
 
 def shafts(tree: LinkTree) -> tuple[LinkJoint, ...]:
@@ -71,12 +59,12 @@ def _pressure_limits(joint: LinkJoint) -> tuple[Parameter, ...]:
 def _sliding_outputs(joint: LinkJoint) -> tuple[Output, ...]:
     """Pressures and utilisation, in the order of the kernel's results."""
     j, words = joint.name, f"{joint.text}{FRICTION_TEXT}"
-    found = [Output(f"journal_pressure_{j}{k}", "pressure", f"mean pressure of journal {k}: {words}", EQUATION)
+    found = [Output(f"journal_pressure_{j}{k}", "pressure", f"mean pressure of journal {k}: {words}")
              for k in "12"]  # fmt: skip
     if joint.kind == "shaft":
-        found.append(Output(f"collar_pressure_{j}", "pressure", f"mean pressure of the collar: {words}", EQUATION))
+        found.append(Output(f"collar_pressure_{j}", "pressure", f"mean pressure of the collar: {words}"))
     text = f"largest mean pressure over its permissible value: {words}"
-    return (*found, Output(f"sliding_utilisation_{j}", "1", text, EQUATION))
+    return (*found, Output(f"sliding_utilisation_{j}", "1", text))
 
 
 def _columns(scene: Scene, inputs: tuple[Parameter, ...], size: int) -> Array:
@@ -127,8 +115,8 @@ def _rolling_inputs(joint: LinkJoint) -> tuple[Parameter, ...]:
 def _rolling_outputs(joint: LinkJoint) -> tuple[Output, ...]:
     text = f"larger equivalent load over the permissible one: {joint.text}"
     return (
-        *load_outputs(joint.name, joint.text, EQUATION),
-        Output(f"rolling_utilisation_{joint.name}", "1", text, EQUATION, kinks=True),
+        *load_outputs(joint.name, joint.text),
+        Output(f"rolling_utilisation_{joint.name}", "1", text, kinks=True),
     )
 
 
@@ -176,7 +164,7 @@ def rolling_turn(scene: Scene, wanted: frozenset[str], accuracy: Accuracy) -> Co
     status = np.zeros(len(scene.designs), np.uint8)
     tree = tree_of(scene)
     for joint in shafts(tree):
-        own = wanted & frozenset(o.name for o in turn_outputs(joint.name, "", EQUATION))
+        own = wanted & frozenset(o.name for o in turn_outputs(joint.name, ""))
         if own:
             found = turn_of_shaft(scene, own, accuracy, _shaft(tree, joint))
             take_over(status, found.pop("status"))
@@ -193,18 +181,12 @@ def sliding_of(name: str) -> Effect:
     own = tuple(p for sizes, limits, _ in found.values() for p in (*sizes, *limits))
     return replace(
         rubbing,
-        key="B1",
-        name=f"{name}_sliding_bearings",
-        title=f"sliding bearings of every shaft and guide: mean pressures, utilisation: {family(name).title}",
-        equation=EQUATION,
-        formulas=SLIDING_FORMULAS,
+        **about("sliding_bearings", name),
         needs=(rubbing.name,),
         inputs=(*rubbing.inputs, *own),
         only_for=only,
         outputs=tuple(replace(o, kinks=True) for _, _, out in found.values() for o in out),
         compute=sliding,
-        called_for="choice of sliding bearings",
-        negligible="other members govern: utilisation below 0.5",
         advise=None,
         bends=tree_bends(tree, tuple(o.name for _, _, out in found.values() for o in out)),
     )
@@ -213,23 +195,17 @@ def sliding_of(name: str) -> Effect:
 def rolling_of(name: str) -> Effect:
     """Make the entry of the rolling bearings of a family with a tree of links."""
     bare, tree = loads_of(name), family(name).the(LinkTree)
-    found = {j: (_rolling_inputs(j), _rolling_outputs(j), turn_outputs(j.name, j.text, EQUATION)) for j in shafts(tree)}
+    found = {j: (_rolling_inputs(j), _rolling_outputs(j), turn_outputs(j.name, j.text)) for j in shafts(tree)}
     only = {p.name: tuple(o.name for o in (*out, *turn)) for (*own, _), out, turn in found.values() for p in own}
     only |= {life.name: (out[-1].name,) for (*_, life), out, _ in found.values()}
     return replace(
         bare,
-        key="B2",
-        name=f"{name}_rolling_bearings",
-        title=f"rolling bearings of every shaft: loads, mean loads over the turn, lives: {family(name).title}",
-        equation=EQUATION,
-        formulas=ROLLING_FORMULAS,
+        **about("rolling_bearings", name),
         needs=(bare.name,),
         inputs=(*bare.inputs, *(p for own, _, _ in found.values() for p in own)),
         only_for=only,
         outputs=tuple(o for _, out, _ in found.values() for o in out),
         compute=rolling,
-        called_for="choice and life of rolling bearings",
-        negligible="sliding bearings; elsewhere never, the life is what is asked for",
         even_crank=True,
         advise=None,
         bends=tuple(b for j, (_, out, _) in found.items() for b in bends_of_shaft(_shaft(tree, j), out[-1].name)),

@@ -15,7 +15,7 @@ from kernels import status as st
 from kernels.effects.coupler import CouplerMotion, coupler_point
 from kernels.linkage.bodies import SLIDE
 from sweep.effects import kinetostatics, link_loads, loads
-from sweep.effects.base import Advice, Effect, largest
+from sweep.effects.base import Advice, Effect, about, largest
 from sweep.effects.link_loads import rod, tree_of
 from sweep.effects.load_passing import FRICTION, LOADS, compute_friction, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
@@ -121,45 +121,6 @@ def _across(vector: Array, line: Array) -> Array:
     return found
 
 
-CLOSED_EQUATION, CLOSED_FRICTION_EQUATION = "D1 (1)-(4), D3 (5)-(7)", "D2 (1)-(4)"
-CLOSED_FORMULAS = (
-    "(1) F_i = m_i (a_Gi - gravity), T_i = J_i eps_i + omega_i x J_i omega_i; Q = T2 + (d2 - b s) x F2; q = n x w",
-    "(2) finger couple m = Q . s/(q . s); R_B = s x (Q - m q)/b + S s",
-    "(3) S t_tau = K/c - (s x (Q - m q)/b - F2) . tau;",
-    "    rocker: K = (T3 + d3 x F3) . k - load_torque (+ m q . k if driven);",
-    "    slider: K/c becomes F3 . tau - load_force",
-    "(4) R_C = R_B - F2; R_D = F3 - R_C; R_A = F1 + R_B; M_A = T1 + d1 x F1 + a rho_B x R_B (+ m q if driving);",
-    "    drive_torque = M_A . u",
-    "(5) J = J_A + m2 v2^2 + omega2 . J2 omega2 + J_D psi'^2 at unit crank speed (slider: m3 s'^2)",
-    "(6) drive_torque = J eps + J' omega^2/2 - sum m_i gravity . v_Gi - load psi'",
-    "(7) chain: the next stage turns by phi2 = kappa psi + offset, loads the rocker with -kappa drive_torque2 and adds",
-    "    psi'^2 J2 to J",
-)
-CLOSED_FRICTION_FORMULAS = (
-    "(1) ball joints: E = -mu r |R| w/|w|, w the speed of the coupler relative to crank or rocker",
-    "(2) shafts: t = -sign(speed) mu [r (F1 + F2) + r_t |F_axial|], F1 and F2 the loads of the two supports;",
-    "    slider: two shoes that move with it, force -sign(s') mu (F1 + F2), ours",
-    "(3) iterated until the couples change by less than 1e-14; L_ij = mu_i r_i |d R_i/d couple_j|,",
-    "    rho(L) < 1 proves one solution",
-    "(4) the moment at A holds the drive torque and leaves the shaft's friction torque out; force and moment at D hold",
-    "    what rubs there",
-)
-TREE_EQUATION, TREE_FRICTION_EQUATION = "docs/links.md (1)-(6)", "docs/links.md (7)-(9)"
-TREE_FORMULAS = (
-    "(1) a body needs F = m (a_G - gravity), T = J eps + omega x J omega; (2) a tool m (a_P - gravity) - F_tool at P",
-    "(3) what hangs on a joint is summed towards the frame; the force x_k of a line that closes a loop enters linearly",
-    "(4) a freedom that nothing drives bears nothing: axis . (M - P x F) = 0 of a turn, axis . F = 0 of a slide",
-    "(5) drive_torque = sum of axis . M over the cranks;  (6) J = sum of m v_G^2 + omega . J omega at unit crank speed",
-)
-TREE_FRICTION_FORMULAS = (
-    "(7) shaft, guide: at each support mu F along (r omega, s') reversed; balls: couple mu r |R| against their",
-    "    turning; contacts: that and a force mu |R| against their sliding",
-    "(8) lost torque of a joint: its friction's power over the crank speed; drive_torque_friction = drive_torque at",
-    "    the loads with friction, plus all of them",
-    "(9) loads of joints: shaft r (F1 + F2) + r_t |F_axial| over r, guide F1 + F2, else |R|; iterated to 1e-14",
-)
-
-
 def _share_of_inertia(scene: Scene, name: str, size: Callable[[Array], Array], quantity: str) -> Advice | None:
     """Share of the ``size`` of an output over the turn due to inertia and weight; 1 without a useful load."""
     names = frozenset({name})
@@ -185,50 +146,37 @@ def _advise_tree(scene: Scene) -> Advice | None:
 
 def _closed(kind: loads.Follower) -> Effect:
     return Effect(
-        key=LOADS,
-        name=f"{kind.prefix}kinetostatics",
-        title=f"joint reactions of crank, coupler and {kind.name}, finger couple, driving torque, reduced inertia",
-        equation=CLOSED_EQUATION,
-        formulas=CLOSED_FORMULAS,
+        **about(f"{kind.prefix}kinetostatics"),
         followers=(kind.name,),
         needs=("coupler",),
         inputs=kind.parameters,
         tool_inputs=loads.TOOLS,
         outputs=(
-            *loads.vector_outputs(kinetostatics.vectors(kind.name), CLOSED_EQUATION),
-            *loads.scalar_outputs(kinetostatics.COUPLES | kinetostatics.INERTIAS, CLOSED_EQUATION),
+            *loads.vector_outputs(kinetostatics.vectors(kind.name)),
+            *loads.scalar_outputs(kinetostatics.COUPLES | kinetostatics.INERTIAS),
         ),
         compute=compute_loads,
-        called_for="joint loads, drive torque, shaking force, balancing",
-        negligible="inertia and weight make less than 10 % of the joint load (low speed): then statics, pressure",
         takes_load=LOADS,
         advise=_advise_closed,
     )
 
 
 def _closed_friction(kind: loads.Follower) -> Effect:
-    equation = CLOSED_FRICTION_EQUATION
     vectors = kinetostatics.vectors(kind.name, FRICTION_SUFFIX, FRICTION_TEXT)
     scalars = kinetostatics.COUPLES_WITH_FRICTION | kinetostatics.losses(kind)
     contraction = "rho(L), bound of its rate; below 1 the solution is unique"
     outputs = kinked((
-        *loads.vector_outputs(vectors, equation),
-        *loads.scalar_outputs(scalars, equation, *loads.PASSES),
-        Output(kinetostatics.CONTRACTION, "1", contraction, equation),
+        *loads.vector_outputs(vectors),
+        *loads.scalar_outputs(scalars, *loads.PASSES),
+        Output(kinetostatics.CONTRACTION, "1", contraction),
     ))  # fmt: skip
     return replace(
         _closed(kind),
-        key=FRICTION,
-        name=f"{kind.prefix}friction",
-        title=f"friction of ball joints, crank shaft and {kind.name} by successive approximations",
-        equation=equation,
-        formulas=CLOSED_FRICTION_FORMULAS,
+        **about(f"{kind.prefix}friction"),
         needs=(f"{kind.prefix}kinetostatics",),
         inputs=(*kind.parameters, *kinetostatics.friction_inputs(kind)),
         outputs=outputs,
         compute=compute_friction,
-        called_for="losses, drive sizing, a check against jamming",
-        negligible="contraction rho(L) below 0.01: joint loads change by less than 1 %",
         takes_load=FRICTION,
         bends=(Bends(frozenset(o.name for o in outputs), ball_slowness, squares=True),),
         advise=largest(compute_friction, kinetostatics.CONTRACTION, "contraction rho(L)", 0.01),
@@ -238,22 +186,15 @@ def _closed_friction(kind: loads.Follower) -> Effect:
 @lru_cache
 def loads_of(name: str) -> Effect:
     """Make the entry of the loads of a family with a tree of links."""
-    found = family(name)
-    tree = found.the(LinkTree)
+    tree = family(name).the(LinkTree)
     return Effect(
-        key=LOADS,
-        name=f"{name}_loads",
-        title=f"joint reactions, driving torque, reduced inertia, tool: {found.title}",
-        equation=TREE_EQUATION,
-        formulas=TREE_FORMULAS,
+        **about("loads", name),
         inputs=link_loads.inputs(tree),
         outputs=(
-            *loads.vector_outputs(link_loads.vectors(tree) | link_loads.TOOL_VECTOR, TREE_EQUATION),
-            *loads.scalar_outputs(link_loads.SCALARS, TREE_EQUATION),
+            *loads.vector_outputs(link_loads.vectors(tree) | link_loads.TOOL_VECTOR),
+            *loads.scalar_outputs(link_loads.SCALARS),
         ),
         compute=compute_loads,
-        called_for="joint loads, drive torque, shaking force, a tool at the working point",
-        negligible="inertia and weight make less than 10 % of the driving torque's range",
         takes_load=LOADS,
         requires=LinkTree,
         tree=tree,
@@ -269,22 +210,16 @@ def friction_of(name: str) -> Effect:
     supports = {at: ("force", words) for at, (_, _, words) in link_loads.support_loads(tree).items()}
     scalars = torque | link_loads.losses(tree) | supports
     outputs = kinked((
-        *loads.vector_outputs(link_loads.vectors(tree, FRICTION_SUFFIX, FRICTION_TEXT), TREE_FRICTION_EQUATION),
-        *loads.scalar_outputs(scalars, TREE_FRICTION_EQUATION, *loads.PASSES),
+        *loads.vector_outputs(link_loads.vectors(tree, FRICTION_SUFFIX, FRICTION_TEXT)),
+        *loads.scalar_outputs(scalars, *loads.PASSES),
     ))  # fmt: skip
     return replace(
         bare,
-        key=FRICTION,
-        name=f"{name}_friction",
-        title=f"friction of all joints by successive approximations: {family(name).title}",
-        equation=TREE_FRICTION_EQUATION,
-        formulas=TREE_FRICTION_FORMULAS,
+        **about("friction", name),
         needs=(bare.name,),
         inputs=(*bare.inputs, *(p for joint in tree.joints for p in link_loads.friction_inputs(joint))),
         outputs=outputs,
         compute=compute_friction,
-        called_for="losses, drive sizing, loads of bearings, a check against jamming",
-        negligible="a few passes settle it: joint loads change by less than 1 %",
         takes_load=FRICTION,
         bends=tree_bends(tree, tuple(o.name for o in outputs)),
         advise=largest(compute_friction, next(iter(loads.PASSES)), "number of passes of the friction iteration", 4.0),

@@ -193,18 +193,18 @@ def follower_of(family: Family) -> Follower:
     return SLIDER if joints is not None and joints.follower == SLIDER.name else ROCKER
 
 
-def vector_outputs(named: Named, equation: str) -> tuple[Output, ...]:
+def vector_outputs(named: Named) -> tuple[Output, ...]:
     """Magnitude and components of vectors as outputs."""
     found = []
     for name, (unit, text) in named.items():
-        found.append(Output(name, unit, f"magnitude: {text}", equation))
-        found += [Output(f"{name}_{axis}", unit, f"{axis}: {text}", equation) for axis in AXES]
+        found.append(Output(name, unit, f"magnitude: {text}"))
+        found += [Output(f"{name}_{axis}", unit, f"{axis}: {text}") for axis in AXES]
     return tuple(found)
 
 
-def scalar_outputs(named: Named, equation: str, jumps: str = "") -> tuple[Output, ...]:
+def scalar_outputs(named: Named, jumps: str = "") -> tuple[Output, ...]:
     """List scalar outputs; the output named ``jumps`` has jumps."""
-    return tuple(Output(name, unit, text, equation, name == jumps) for name, (unit, text) in named.items())
+    return tuple(Output(name, unit, text, jumps=name == jumps) for name, (unit, text) in named.items())
 
 
 def frame(suffix: str = "", text: str = "") -> Named:

@@ -5,19 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from kernels.effects.coupler import CouplerMotion, centre_acceleration, coupler_point
-from sweep.effects.base import Advice, Effect
+from sweep.effects.base import Advice, Effect, about
 from sweep.effects.scene import Scene
 from sweep.families.base import Columns, Output, Parameter
 from sweep.families.poses import filled_each
-
-EQUATION = "C0 (1)-(4)"
-FORMULAS = (
-    "(1) m = w x s (times the branch for a driven finger), n = m/|m|; w = rho (driven) or u (driving)",
-    "(2) P = B + x s + y (n x s) + z n",
-    "(3) omega = s x s' + q s, q = -m' . (n x s)/|m|; P' = B' + omega x p, P'' = B'' + eps x p + omega x (omega x p)",
-    "(4) finger at C: Rz(psi) Rx(euler_theta) Rz(euler_phi) turns x to s, z to n",
-    "    finger at B: euler_theta = atan2(s . e1, -s . e2) about u, euler_phi = atan2(-s . u, |u x s|)",
-)
 
 CONSTRUCTION = Parameter(
     "finger", "choice",
@@ -41,13 +32,11 @@ _GROUPS = {
     "eps": ("eps_{axis}", "1", "angular acceleration of the coupler along {axis} per unit crank speed squared"),
 }
 _EULER = (
-    Output(
-        "euler_theta", "rad", "nutation of the coupler: about the node line, after the precession", EQUATION, wraps=True
-    ),
-    Output("euler_phi", "rad", "rotation of the coupler about its own third axis", EQUATION, wraps=True),
+    Output("euler_theta", "rad", "nutation of the coupler: about the node line, after the precession", wraps=True),
+    Output("euler_phi", "rad", "rotation of the coupler about its own third axis", wraps=True),
 )
 OUTPUTS = _EULER + tuple(
-    Output(name.format(axis=axis), unit, text.format(axis=axis), EQUATION)
+    Output(name.format(axis=axis), unit, text.format(axis=axis))
     for name, unit, text in _GROUPS.values()
     for axis in "xyz"
 )
@@ -109,22 +98,15 @@ def advise(scene: Scene) -> Advice | None:
 
 
 EFFECT = Effect(
-    key="C0",
-    name="coupler",
-    title="motion of a coupler point, orientation and rates of the coupler",
-    equation=EQUATION,
-    formulas=FORMULAS,
+    **about("coupler"),
     inputs=INPUTS,
     outputs=OUTPUTS,
     rates=RATES,
     compute=compute,
-    called_for="a tool on the coupler, a coupler whose centre of mass is off the line B-C",
-    negligible="coupler mass below 5 % of the rocker's inertia over c^2 (of the slider's mass), and balanced",
     advise=advise,
 )
 
 
-SHAKING_EQUATION = "M1 (1), (2)"
 SHAKING = "shaking_estimate"
 
 SHAKING_OUTPUTS = (
@@ -132,10 +114,9 @@ SHAKING_OUTPUTS = (
         SHAKING, "length",
         "acceleration analogue of the links' common centre of mass: shaking force over moving mass and square of the "
         "crank speed, if the links are slender rods of one mass per length",
-        SHAKING_EQUATION,
     ),
     *(
-        Output(f"{SHAKING}_{axis}", "length", f"{axis} of the shaking estimate, fixed axes", SHAKING_EQUATION)
+        Output(f"{SHAKING}_{axis}", "length", f"{axis} of the shaking estimate, fixed axes")
         for axis in "xyz"
     ),
 )  # fmt: skip
@@ -150,17 +131,7 @@ def compute_shaking(scene: Scene, wanted: frozenset[str]) -> Columns:
 
 
 SHAKING_EFFECT = Effect(
-    key="M1",
-    name="shaking",
-    title="shaking force without masses: links like slender rods of one mass per length",
-    equation=SHAKING_EQUATION,
-    formulas=(
-        "(1) (a + b + c) S'' = a B''/2 + b (B'' + C'')/2 + c C''/2; a slider counts for nothing (c = 0)",
-        "(2) crank of a chain's later stage: P'' becomes w^2 P'' + w' P', w = its speed over that of stage 1",
-        "    shaking force = moving mass * crank speed^2 * S''",
-    ),
+    **about("shaking"),
     outputs=SHAKING_OUTPUTS,
     compute=compute_shaking,
-    called_for="comparing mechanisms before masses are known; joint loads give the shaking force itself",
-    negligible="slow machines, heavy frames",
 )

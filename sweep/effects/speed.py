@@ -13,31 +13,16 @@ from kernels.effects.speed_fluctuation import RESOLVED
 from kernels.types import EPS, Status
 from sweep.effects import load_effects, loads
 from sweep.effects.acceleration import NEEDED, NEEDED_NAMES, TARGET, balanced, extremes, rubbing_torque
-from sweep.effects.base import Advice, DesignResult, Effect
+from sweep.effects.base import Advice, DesignResult, Effect, about
 from sweep.effects.load_passing import FRICTION, LOADS, compute_loads
 from sweep.effects.loads import FRICTION_SUFFIX, FRICTION_TEXT
 from sweep.effects.scene import Scene, take_over
 from sweep.effects.turn import at_poses, on_finer_grids, per_turn, reduction_outputs
-from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Output, Parameter, floats
 from sweep.families.curve_features import Switches
 from sweep.numerics.even_grids import FINER, GRIDS, LEFT, PER_LEFT, steady
 from sweep.numerics.records import Mask
 
-EQUATION = "D4 (1)-(4)"
-FORMULAS = (
-    "(1) W(phi) = primitive of drive minus load torque, its mean removed; drive torque constant",
-    "(2) omega = sqrt(2 (E + W)/J), E from 2 pi/omega_mean = integral of d phi/omega; eps = d(omega^2)/d phi/2,",
-    "    at a pose from the torques there: J eps = M_drive - M_load - J' omega^2/2",
-    "(3) unevenness = (omega_max - omega_min)/omega_mean;",
-    "    estimate [max - min of W - (J - mean J) omega^2/2]/(mean J omega^2)",
-    "(4) motor line: d(J omega^2/2)/d phi = X + M - motor_slope (omega - omega_mean), X the excess of loads, M from",
-    "    omega_mean; its time constant is mean J/motor_slope",
-)
-
-FRICTION_FORMULA = "(5) friction takes drive_torque_friction - drive_torque, both at omega(phi), eps(phi)"
-
-TITLE = "fluctuation of the crank speed at constant mean speed"
 FLYWHEEL = Parameter(
     "flywheel", "inertia", "inertia on the crank shaft besides the links", default=0.0, not_negative=True
 )
@@ -61,17 +46,17 @@ def _outputs(suffix: str, text: str) -> tuple[Output, ...]:
     """Speed and angular acceleration of the crank over the turn."""
     steady = f"speed of the crank in the steady state of constant mean speed{text}"
     return (
-        Output(f"crank_speed{suffix}", "rad/s", steady, EQUATION),
-        Output(f"crank_acceleration{suffix}", "rad/s^2", f"its angular acceleration{text}", EQUATION),
+        Output(f"crank_speed{suffix}", "rad/s", steady),
+        Output(f"crank_acceleration{suffix}", "rad/s^2", f"its angular acceleration{text}"),
     )
 
 
 def _numbers(suffix: str, text: str) -> tuple[Output, ...]:
     """List the outputs per turn."""
     return (
-        Output(f"unevenness{suffix}", "1", f"(largest - smallest crank speed)/mean{text}", EQUATION),
-        Output(f"fastest{suffix}", "rad/s", f"largest magnitude of the crank speed{text}", EQUATION),
-        Output(f"slowest{suffix}", "rad/s", f"smallest magnitude of the crank speed{text}", EQUATION),
+        Output(f"unevenness{suffix}", "1", f"(largest - smallest crank speed)/mean{text}"),
+        Output(f"fastest{suffix}", "rad/s", f"largest magnitude of the crank speed{text}"),
+        Output(f"slowest{suffix}", "rad/s", f"smallest magnitude of the crank speed{text}"),
     )
 
 
@@ -256,27 +241,22 @@ def advise(scene: Scene) -> Advice | None:
     return Advice.of_turning("estimated unevenness of the crank speed", estimate, 0.01)
 
 
-def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None) -> Effect:
-    """Make the entry for mechanisms with the load effect ``loaded`` and, if given, the friction of ``rubbing``."""
+def _effect(kind: str, loaded: Effect, rubbing: Effect | None = None, of: str = "") -> Effect:
+    """Make the entry for mechanisms with the load effect ``loaded`` and, if given, the friction of ``rubbing``.
+
+    ``of`` is the name of the family that both are made for, if any.
+    """
     rubs = rubbing is not None
     suffix, text = SUFFIX[rubs], FRICTION_TEXT if rubs else ""
-    curves = _outputs(suffix, text)
+    curves, texts = _outputs(suffix, text), about(f"{kind}{suffix}", of)
     results = (*_numbers(suffix, text), *reduction_outputs(curves))
     return replace(
         loaded,
-        key="D4, D2" if rubs else "D4",
-        name=f"{name}{suffix}",
-        title=title.replace(TITLE, f"{TITLE}{text}"),
-        equation="D4 (1)-(5)" if rubs else EQUATION,
-        formulas=(*FORMULAS, FRICTION_FORMULA) if rubs else FORMULAS,
-        needs=(loaded.name,) if rubbing is None else (name, rubbing.name),
+        **texts,
+        needs=(loaded.name,) if rubbing is None else (texts["name"].removesuffix(suffix), rubbing.name),
         inputs=(*(loaded if rubbing is None else rubbing).inputs, FLYWHEEL, MOTOR),
         outputs=curves,
         compute=partial(compute, rubs=rubs),
-        called_for="unevenness of a drive whose joints rub"
-        if rubs
-        else "unevenness of the speed asked for, a light drive",
-        negligible="friction takes less than a tenth of the torque" if rubs else "estimated unevenness below 1 %",
         whole_turn=True,
         even_crank=True,
         takes_load=FRICTION if rubs else LOADS,
@@ -287,8 +267,7 @@ def _effect(name: str, title: str, loaded: Effect, rubbing: Effect | None = None
 
 def of_tree(name: str, rubbing: Effect | None = None) -> Effect:
     """Make the entry of a family with a tree of links."""
-    title, loaded = f"{TITLE}: {family(name).title}", load_effects.loads_of(name)
-    return _effect(f"{name}_speed_fluctuation", title, loaded, rubbing)
+    return _effect("speed_fluctuation", load_effects.loads_of(name), rubbing, name)
 
 
 def rubbing_tree(name: str) -> Effect:
@@ -296,8 +275,8 @@ def rubbing_tree(name: str) -> Effect:
     return of_tree(name, load_effects.friction_of(name))
 
 
-_SLIDER_NAME = f"{loads.SLIDER.prefix}speed_fluctuation"
-EFFECT = _effect("speed_fluctuation", TITLE, load_effects.KINETOSTATICS)
-SLIDER = _effect(_SLIDER_NAME, TITLE, load_effects.SLIDER_KINETOSTATICS)
-RUBBING_EFFECT = _effect("speed_fluctuation", TITLE, load_effects.KINETOSTATICS, load_effects.CLOSED_FRICTION)
-RUBBING_SLIDER = _effect(_SLIDER_NAME, TITLE, load_effects.SLIDER_KINETOSTATICS, load_effects.SLIDER_FRICTION)
+_OF_SLIDER = f"{loads.SLIDER.prefix}speed_fluctuation"
+EFFECT = _effect("speed_fluctuation", load_effects.KINETOSTATICS)
+SLIDER = _effect(_OF_SLIDER, load_effects.SLIDER_KINETOSTATICS)
+RUBBING_EFFECT = _effect("speed_fluctuation", load_effects.KINETOSTATICS, load_effects.CLOSED_FRICTION)
+RUBBING_SLIDER = _effect(_OF_SLIDER, load_effects.SLIDER_KINETOSTATICS, load_effects.SLIDER_FRICTION)

@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.effects.thread import capstan, thread_contour, thread_speed
 from kernels.types import Status
-from sweep.effects.base import Effect
+from sweep.effects.base import Effect, about
 from sweep.effects.loads import CHANGE
 from sweep.effects.scene import Scene, refuse
 from sweep.families.base import Array, Columns, Output, Parameter, floats
@@ -41,29 +41,25 @@ SPEED_INPUTS = (
 MEASURED = ("thread_speed_low", "thread_speed_high")
 CAPSTAN_INPUTS = (BEFORE, Parameter("mu_eyelet", "ratio", "coefficient of friction of the eyelet", not_negative=True))
 
-CONTOUR_EQUATION = "docs/thread.md (1) to (3)"
 CONTOUR_OUTPUTS = (
-    Output("tension", "1", "tension of the thread behind the eyelet, gf", CONTOUR_EQUATION),
-    Output("tension_euler", "1", "its part from the tension in front of the eyelet, gf", CONTOUR_EQUATION),
-    Output("tension_bending", "1", "its part from bending round the contour, gf", CONTOUR_EQUATION),
-    Output("tension_adhesion", "1", "its part from adhesion, gf", CONTOUR_EQUATION),
+    Output("tension", "1", "tension of the thread behind the eyelet, gf"),
+    Output("tension_euler", "1", "its part from the tension in front of the eyelet, gf"),
+    Output("tension_bending", "1", "its part from bending round the contour, gf"),
+    Output("tension_adhesion", "1", "its part from adhesion, gf"),
 )
-SPEED_EQUATION = "docs/thread.md (7), (8)"
 SPEED_OUTPUTS = (
-    Output("thread_speed", "length/s", "speed at which thread is taken up", SPEED_EQUATION),
-    Output("thread_acceleration", "length/s^2", "acceleration at which thread is taken up", SPEED_EQUATION),
+    Output("thread_speed", "length/s", "speed at which thread is taken up"),
+    Output("thread_acceleration", "length/s^2", "acceleration at which thread is taken up"),
     Output(
         "speed_ratio",
         "1",
         "tension at that speed, within the measured speeds, over the tension at the reference speed",
-        SPEED_EQUATION,
         kinks=True,
     ),
 )
-CAPSTAN_EQUATION = "docs/thread.md (5), (6)"
 CAPSTAN_OUTPUTS = (
-    Output("capstan_tension", "1", "tension behind the eyelet by Euler's law, gf", CAPSTAN_EQUATION),
-    Output("eyelet_force", "1", "force of the thread on the eyelet, gf", CAPSTAN_EQUATION),
+    Output("capstan_tension", "1", "tension behind the eyelet by Euler's law, gf"),
+    Output("eyelet_force", "1", "force of the thread on the eyelet, gf"),
 )
 
 
@@ -124,45 +120,24 @@ def measured_ends(scene: Scene) -> Array:
 
 
 CONTOUR = Effect(
-    key="T1",
-    name="thread_contour",
-    title="tension of the thread behind the eyelet of a take-up",
-    equation=CONTOUR_EQUATION,
-    formulas=(
-        "T2 = T1 e^x + (B/(R + r)^2) (e^x - 1) + alpha R theta (e^x - 1)/x,  x = beta theta",
-        "r = 1/sqrt(pi gamma N)",
-    ),
+    **about("thread_contour"),
     inputs=CONTOUR_INPUTS,
     outputs=CONTOUR_OUTPUTS,
     compute=contour,
-    called_for="tension of the thread over the turn",
-    negligible="radius of the contour between 0.5 and 4 mm: within 13 % of the least tension, a constant will do",
     requires=ThreadPath,
 )
 SPEED = Effect(
-    key="T2",
-    name="thread_speed",
-    title="speed of the thread at a take-up and what it makes of the tension",
-    equation=SPEED_EQUATION,
-    formulas=("v = P' omega,  a = P'' omega^2 + P' eps", "T(v)/T(v_ref) = 1 + K ((v/v_ref)^n - 1)"),
+    **about("thread_speed"),
     inputs=SPEED_INPUTS,
     outputs=SPEED_OUTPUTS,
     compute=speed,
     bends=(Bends(frozenset({"speed_ratio"}), measured_ends),),
-    called_for="wide range of the thread's speed",
-    negligible="speed within +-30 % of the reference: less than 3 %",
     requires=ThreadPath,
 )
 CAPSTAN = Effect(
-    key="W1",
-    name="capstan",
-    title="Euler's law at the eyelet of a take-up, and the force on the eyelet",
-    equation=CAPSTAN_EQUATION,
-    formulas=("T2 = T1 e^(mu wrap)", "F = sqrt((T2 - T1)^2 + 4 T1 T2 sin^2(wrap/2))"),
+    **about("capstan"),
     inputs=CAPSTAN_INPUTS,
     outputs=CAPSTAN_OUTPUTS,
     compute=euler,
-    called_for="load of the thread on its take-up",
-    negligible="force of the thread below that of the take-up's inertia",
     requires=ThreadPath,
 )

@@ -10,19 +10,18 @@ import numpy as np
 from kernels.effects.tool import ToolLoad, tool_load
 from kernels.types import Status
 from sweep.effects import loads
-from sweep.effects.base import ON_TIP, Effect, tool_place
+from sweep.effects.base import ON_TIP, Effect, about, tool_place
 from sweep.effects.motion import CONSTRUCTION
 from sweep.effects.scene import Scene
 from sweep.families.base import Array, Columns, Output
 from sweep.families.capabilities import JointRecords, ToolPoint
 from sweep.families.poses import chosen
 
-EQUATION = "docs/tool.md (1), (2), (6)"
 _SHARE = "in the torque about this stage's crank"
 OUTPUTS = (
-    Output("tool_load", "force", "force of the coupler on the tool: along its way, or its magnitude if it moves freely",
-           EQUATION),
-    Output("tool_torque", "torque", f"share of the tool {_SHARE}", EQUATION),
+    Output("tool_load", "force", "force of the coupler on the tool: along its way, or its magnitude if it moves "
+           "freely"),
+    Output("tool_torque", "torque", f"share of the tool {_SHARE}"),
 )  # fmt: skip
 TIP_OUTPUTS = (
     Output("tip_load", "force", "magnitude of the force of the rocker on the tool at its tip", "docs/tool.md (6)"),
@@ -88,36 +87,19 @@ def compute(scene: Scene, wanted: frozenset[str]) -> Columns:
     return chosen({load.name: along[:, :, 0], torque.name: along[:, :, 1]}, wanted, status)
 
 
-_FREE = "(6) a tool that moves freely with its point P: its load is |m_tool (a_P - gravity) - tool_force|"
-
 EFFECT = Effect(
-    key="U3",
-    name="tool",
-    title="inertia, weight and working force of a tool at a point of the coupler",
-    equation=EQUATION,
-    formulas=(
-        "(1) tool_load = m_tool (s'' omega^2 + s' eps - gravity . lam) - tool_force",
-        "    + pierce_force on the way from pierce_at into the fabric, to the turning point",
-        "(2) it acts on the coupler at the guided point, reversed: loads, friction, drive torque, inertia",
-        _FREE,
-    ),
+    **about("tool"),
     inputs=(*loads.GRAVITY, loads.SPEED, loads.CHANGE, CONSTRUCTION),
     tool_inputs=loads.TOOLS,
     outputs=OUTPUTS,
     compute=compute,
-    called_for="mass of the needle bar, force of the needle",
-    negligible="mass of the tool far below that of the links, reduced to the same way",
     requires=ToolPoint,
 )
 
 TIP = replace(
     EFFECT,
-    name="tip_tool",
-    title="inertia, weight and working force of a tool at the tip of the rocker",
-    equation="docs/tool.md (6), (7)",
-    formulas=(_FREE, "(7) it acts on the rocker, reversed: loads, friction, drive torque, inertia"),
+    **about("tip_tool"),
     outputs=TIP_OUTPUTS,
-    called_for="mass of a looper on its rocker, force of the thread",
     requires=JointRecords,
     carried_at=ON_TIP,
 )
