@@ -132,7 +132,7 @@ def test_task7_surplus_goes_to_the_pressure_angle():
     smooth, easy = best(TASK7), best(Case(Task7, **TASK7.numbers, objective="pressure_angle"))
     wanted = ["max_pressure_angle2", "max_abs_d2s"]
     one, other = (sweep.summarise(["rssr", "rssp"], chain_columns(s, "rssp"), wanted).iloc[0] for s in (smooth, easy))
-    assert np.sin(other["max_pressure_angle2"]) == pytest.approx(easy.objective, rel=2e-3)
+    assert other["max_pressure_angle2"] == pytest.approx(easy.objective, rel=2e-3)
     assert other["max_pressure_angle2"] < one["max_pressure_angle2"] - 0.01
     assert other["max_abs_d2s"] > one["max_abs_d2s"]
     assert max(abs(residual) for residual in easy.equations.values()) < 1e-9

@@ -127,6 +127,12 @@ def test_solution_reads_as_text():
             "positions = 2; allowed: 1 to 1",
         ),
         (lambda: Task1(0.9, 3.3, 1.0, 0.0, 1.0, ()), "positions"),
+        # Every mechanism of the task stands there: the offset was that of rounding.
+        (lambda: Task1(0.9, 3.3, 1.0, 0.0, 1.0, (Position(3.3, 0.9),)), r"other than at the limits, \(0.0, 3.3\)"),
+        (
+            lambda: Task2((0.5, 1.0), (3.0, 3.5), 1.0, 0.0, 1.0, (Position(1, 0.2), Position(2 * np.pi, 0.6))),
+            "other than at the limits",
+        ),
         (lambda: Task2((0.5, 1.0), (3.0, 3.5), 1.0, 0.0, 0.0, (Position(1, 0.2), Position(2, 0.6))), "alpha"),
         (lambda: Task3(0.8, 3.2, (Setting(0.8),), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "another swing"),
         (lambda: Task3(0.8, 3.2, (Setting(None),), "f", (-1, 1), 1.0, 1.0, 1.3, (-1, 1)), "another swing"),

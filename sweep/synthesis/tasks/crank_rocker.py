@@ -158,7 +158,7 @@ class EngineeringMethod(LocusTask):
         if self.objective == "acceleration":
             curve = acceleration(designs)
         else:
-            curve = np.sqrt(1.0 - least_cos2(designs))[:, None]  # sine of the largest pressure angle
+            curve = outputs_of(designs, ["max_pressure_angle"], _EXACT)["max_pressure_angle"][:, None]
         limits = {"pressure angle": pressure_limit(designs, self.max_pressure_angle)}
         limits |= {"bearings": bearing_reserve(designs, self.bearings)} if self.bearings else {}
         return Candidates({}, limits, curve, columns)

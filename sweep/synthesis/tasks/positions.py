@@ -27,6 +27,7 @@ from sweep.synthesis.tasks.crank_rocker import (
 from sweep.synthesis.tasks.problem import Candidates, SynthesisTask, Unknown, ranges, turning
 
 PLANAR = 1e-12  # |sin(alpha)| below which f has no influence
+AT_LIMIT = 1e-6  # rad from a limit position, where (15) of docs/synthesis.md is 0 = 0 for every f
 
 
 class Position(NamedTuple):
@@ -34,6 +35,13 @@ class Position(NamedTuple):
 
     dphi: float
     dpsi: float
+
+
+def _between_limits(positions: tuple[Position, ...], limits: tuple[float, ...], task: str) -> None:
+    """Refuse positions at the crank angle of a limit position: they say nothing, or contradict the swing."""
+    for position in positions:
+        if min(abs(np.sin(0.5 * (position.dphi - limit))) for limit in limits) < 0.5 * AT_LIMIT:
+            raise InputError("positions", position, f"dphi other than at the limits, {limits}", task)
 
 
 def through_positions(
@@ -99,7 +107,7 @@ class Task1(LocusTask):
     Raises
     ------
     InputError
-        for no position, or more than the mechanism can take.
+        for no position, more than the mechanism can take, or one at a limit.
     """
 
     positions: tuple[Position, ...]
@@ -110,6 +118,7 @@ class Task1(LocusTask):
         room = 2 if abs(np.sin(self.alpha)) > PLANAR else 1
         if not 1 <= len(self.positions) <= room:
             raise InputError("positions", len(self.positions), f"1 to {room}", "Task1")
+        _between_limits(self.positions, (0.0, self.phi0), "Task1")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:
@@ -138,7 +147,8 @@ class Task2(SynthesisTask):
     Raises
     ------
     InputError
-        for a planar mechanism, whose closure does not contain f, or another number of positions.
+        for a planar mechanism, whose closure does not contain f, another number of positions, or one at the extended
+        limit.
     """
 
     swing_range: tuple[float, float]
@@ -157,6 +167,7 @@ class Task2(SynthesisTask):
             raise InputError("alpha", alphas, "angles whose sines are not 0", "Task2")
         if len(self.positions) != 2:
             raise InputError("positions", len(self.positions), "2", "Task2")
+        _between_limits(self.positions, (0.0,), "Task2")
 
     @property
     def unknowns(self) -> tuple[Unknown, ...]:

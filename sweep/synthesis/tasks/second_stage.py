@@ -308,6 +308,4 @@ class Task7(SynthesisTask):
             equations[f"acceleration at the {end}"] = self.kappa * second * ds[:, k] / value - 1.0
         d2s, angle = chain_motion("rssp", columns, "d2s", "pressure_angle2")
         limits = {"pressure angle 2": second_pressure_limit(angle, self.max_pressure_angle)}
-        return Candidates(
-            equations, limits, with_tops(d2s if self.objective == "acceleration" else np.sin(angle)), columns
-        )
+        return Candidates(equations, limits, with_tops(d2s if self.objective == "acceleration" else angle), columns)
