@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -24,16 +25,7 @@ from sweep.quantities.units import one_value
 @BACKEND
 @click.option("--smoke", is_flag=True, help="The tiny version of every study.")
 @click.option("--on-change", metavar="CMD", help="Command to run unless the exit code is 0; the log is its input.")
-def nightly(
-    studies: tuple[Path, ...],
-    into: Path,
-    budget: str,
-    keep: int,
-    jobs: int,
-    backend: str,
-    smoke: bool,
-    on_change: str | None,
-) -> None:
+def nightly(studies: tuple[Path, ...], budget: str, **settings: Any) -> None:
     """Compute all STUDIES into a dated folder, and say what changed since the last good night.
 
     STUDIES are study files, folders with one, or folders of such folders.  What the last night did not finish comes
@@ -44,6 +36,5 @@ def nightly(
     study was slower twice in a row, 74 if the disk refused; with a study's own code if its run failed.
     """
     seconds = one_value(budget, "s", "--budget", "nightly")
-    settings = Settings(into, seconds, keep, jobs, backend, smoke, on_change)
-    record = run_night(studies, settings, click.echo)
+    record = run_night(studies, Settings(budget=seconds, **settings), click.echo)
     click.get_current_context().exit(record.exit_code)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any
 
 import click
 import pandas as pd
@@ -71,19 +72,6 @@ OF_DESIGNS = ("motion", "mechanism", "polar_load", "cyclogram")
 ENDINGS = (".svg", ".png", ".pdf")
 
 
-class Options(TypedDict):
-    """Options of the figures, each used by some of them."""
-
-    design: str | None
-    row: int
-    want: str | None
-    phi: float
-    view: str | None
-    positions: int
-    output: str | None
-    angles: AngleUnit | None
-
-
 @click.command()
 @click.argument("what", type=click.Choice([*OF_DESIGNS, *OF_DATASETS]))
 @click.argument("source")
@@ -100,7 +88,7 @@ class Options(TypedDict):
 @click.option("--view", help="For mechanism: space, xy, zy or xz.")
 @click.option("--positions", type=click.IntRange(min=1), default=1, show_default=True, help="For mechanism: how many.")
 @click.option("--output", help="For tolerance: output whose histogram is drawn; without it, all outputs in percent.")
-def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpack[Options]) -> None:
+def draw(what: str, source: str, table: Path | None, out: Path, **options: Any) -> None:
     """Draw one picture.
 
     SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, angles in rad
@@ -128,7 +116,7 @@ def draw(what: str, source: str, table: Path | None, out: Path, **options: Unpac
     click.echo(f"{what}: {out}")
 
 
-def _table(source: str, table: Path | None, out: Path, options: Options) -> None:
+def _table(source: str, table: Path | None, out: Path, options: Mapping[str, Any]) -> None:
     """Write the cyclogram of one design as a table."""
     mechanism, design = _design(source, table, options["design"], options["row"])
     rows = cyclogram(mechanism, design, angles="rad" if table is None else options["angles"])
@@ -137,14 +125,14 @@ def _table(source: str, table: Path | None, out: Path, options: Options) -> None
     click.echo(f"cyclogram: {out}")
 
 
-def _made(source: str, table: Path | None, options: Options) -> dict[str, tuple[float, float]]:
+def _made(source: str, table: Path | None, options: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
     """Return the intervals [deg] of manufactured mechanisms' events by name, known for the optimum of a folder."""
     if table is not None or options["design"] not in (None, "optimum"):
         return {}
     return event_bands(read_dataset(located(source)))
 
 
-def _of_one(what: str, source: str, table: Path | None, options: Options) -> Any:
+def _of_one(what: str, source: str, table: Path | None, options: Mapping[str, Any]) -> Any:
     """Draw one design of a folder, or of a family and a table."""
     mechanism, design = _design(source, table, options["design"], options["row"], several=what == "motion")
     keywords: dict[str, dict[str, Any]] = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -30,17 +31,7 @@ from sweep.jobs.progress import stages
     help="No budget: start and go on whatever it costs; set data of another study in the folder aside.",
 )
 @click.option("--report", is_flag=True, help="Then draw the study's own figures (its figure.py) and write report.html.")
-def run(
-    study: Path,
-    out: Path | None,
-    jobs: int,
-    backend: str,
-    accuracy: float | None,
-    certify: bool,
-    smoke: bool,
-    force: bool,
-    report: bool,
-) -> None:
+def run(study: Path, out: Path | None, certify: bool, smoke: bool, report: bool, **options: Any) -> None:
     """Run or resume a study.
 
     An interrupted run is resumed by the same command.  Finished chunks are never computed twice, and the result is the
@@ -53,7 +44,6 @@ def run(
     from sweep.engine.searches import stages_of
     from sweep.study import load_study
 
-    proof = True if certify else None
     cut_short: SearchCutShort | None = None
     model = load_study(study, smoke=smoke)
     after: list[str] = []
@@ -64,9 +54,7 @@ def run(
         after = ["report"] if figures is None else ["figures", "report"]
     with stages(*stages_of(model), *after):
         try:
-            folder = run_study(
-                model, out, jobs, backend, smoke=smoke, force=force, accuracy=accuracy, certify=proof, progress=True
-            )
+            folder = run_study(model, out, smoke=smoke, certify=certify or None, progress=True, **options)
         except SearchCutShort as error:
             cut_short, folder = error, error.folder
         if is_part(folder):  # the answer is for the whole dataset, after the parts are merged

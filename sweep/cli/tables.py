@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -106,17 +107,7 @@ def evaluate_table(
 @TEXT
 @OUT
 def summarise_table(
-    family: str,
-    table: Path,
-    want: tuple[str, ...],
-    samples: int | None,
-    accuracy: float | None,
-    certify: bool,
-    window: tuple[float, float] | None,
-    angles: AngleUnit | None,
-    keep: tuple[str, ...],
-    status_text: bool,
-    out: Path | None,
+    family: str, table: Path, want: tuple[str, ...], keep: tuple[str, ...], out: Path | None, **options: Any
 ) -> None:
     """Compute design outputs of the designs in TABLE (.parquet or .csv), one row per design.
 
@@ -125,20 +116,8 @@ def summarise_table(
     status that says why.
     """
     out = checked_format(out, table)
-    designs = read_table(table)
-    result = summarise(
-        family_names(family),
-        designs,
-        wanted(want),
-        samples=samples,
-        accuracy=accuracy,
-        certify=certify,
-        window=window,
-        keep=kept(keep),
-        status_text=status_text,
-        angles=angles,
-    )
-    write_table(result, out)
+    # The other options are those of `sweep.summarise`.
+    write_table(summarise(family_names(family), read_table(table), wanted(want), keep=kept(keep), **options), out)
 
 
 def refuse_degrees(domain: Domain, phi: float) -> None:
