@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import base64
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -85,27 +85,18 @@ def crank_axis(axes: Axes, label: str) -> None:
     axes.set_xlabel(label)
 
 
-@dataclass(frozen=True)
-class Overlay:
-    """A known line in the plane of two axes, in stored units."""
-
-    label: str
-    x: Array
-    y: Array
-
-
 def map_figure(
     grid: Grid,
     x: tuple[Cells, ShownQuantity],
     y: tuple[Cells, ShownQuantity],
     designs: float,
     objective: ShownQuantity | None,
-    marks: dict[str, tuple[float, float]],
-    overlays: Sequence[Overlay],
+    marks: Mapping[str, Array],
+    overlays: Sequence[tuple[str, Array]],
 ) -> Figure:
-    """Draw the best objective per cell and the share of feasible designs in the cell; ``marks`` are in stored units.
+    """Draw the best objective per cell and the share of feasible designs in the cell.
 
-    Marks outside the searched space are left out.
+    Marks (2,) and overlays (n, 2) are in stored units; marks outside the searched space are left out.
     """
     from matplotlib.colors import LogNorm, Normalize
     from matplotlib.ticker import LogLocator
@@ -114,6 +105,7 @@ def map_figure(
     figure.subplots_adjust(left=0.08, right=0.98, bottom=0.2, top=0.98, wspace=0.08)
     panels = figure.subplots(1, 2 if objective is not None else 1, squeeze=False, sharex=True, sharey=True)[0]
     (x_cells, x_shown), (y_cells, y_shown) = x, y
+    factors = np.array([x_shown.factor, y_shown.factor])
     edges = x_cells.edges * x_shown.factor, y_cells.edges * y_shown.factor
     shares = grid.count / (designs * np.outer(y_cells.weights, x_cells.weights))
     share = np.where(grid.count > 0, 100.0 * np.minimum(shares, 1.0), np.nan)
@@ -135,14 +127,10 @@ def map_figure(
             bar.minorticks_off()
         axes.set_xlabel(x_shown.label)
         limits = axes.get_xlim(), axes.get_ylim()
-        for overlay in overlays:
-            axes.plot(overlay.x * x_shown.factor, overlay.y * y_shown.factor, color=LIMIT, label=overlay.label)
-        inside = {
-            role: (x, y)
-            for role, (x, y) in marks.items()
-            if _between(x * x_shown.factor, limits[0]) and _between(y * y_shown.factor, limits[1])
-        }
-        _place(axes, inside, x_shown.factor, y_shown.factor)
+        for name, points in overlays:
+            axes.plot(*(points * factors).T, color=LIMIT, label=name)
+        shown = {role: at * factors for role, at in marks.items()}
+        _place(axes, {role: at for role, at in shown.items() if all(map(_between, at, limits))})
         axes.set_xlim(limits[0])
         axes.set_ylim(limits[1])
     panels[0].set_ylabel(y_shown.label)
@@ -211,12 +199,15 @@ def trade_off(data: Dataset, scanned: Scan) -> Figure | None:
         axes.axhline(
             limit * second.factor, color=LIMIT, linewidth=0.9, linestyle=":", label=f"limit of {second.symbol}"
         )
-    both = {
-        role: (compared(objective.name, float(row[objective.name])), compared(second.name, float(row[second.name])))
-        for role, row in marked(data).items()
-        if row is not None
-    }
-    _place(axes, both, objective.factor, second.factor)
+    both = (objective, second)
+    marks = {role: row for role, row in marked(data).items() if row is not None}
+    _place(
+        axes,
+        {
+            role: np.array([compared(q.name, float(row[q.name])) * q.factor for q in both])
+            for role, row in marks.items()
+        },
+    )
     for axis, k in ((axes.set_xscale, 0), (axes.set_yscale, 1)):
         positive = scatter[:, k][scatter[:, k] > 0.0]
         if positive.size == len(scatter) and positive.size and positive.max() > 30.0 * positive.min():
@@ -245,12 +236,10 @@ def _between(value: float, ends: tuple[float, float]) -> bool:
     return ends[0] - edge <= value <= ends[1] + edge
 
 
-def _place(axes: Axes, marks: dict[str, tuple[float, float]], x_factor: float, y_factor: float) -> None:
-    for role, (x, y) in marks.items():
-        if np.isfinite(x) and np.isfinite(y):
-            axes.scatter(
-                x * x_factor, y * y_factor, label=role, zorder=5, edgecolors="white", clip_on=False, **MARKS[role]
-            )
+def _place(axes: Axes, marks: Mapping[str, Array]) -> None:
+    for role, at in marks.items():
+        if np.isfinite(at).all():
+            axes.scatter(*at, label=role, zorder=5, edgecolors="white", clip_on=False, **MARKS[role])
 
 
 def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str, str] | None = None) -> Figure | None:
@@ -267,7 +256,7 @@ def design_map(data: Dataset, scanned: Scan, cells: list[Cells], pair: tuple[str
     pair = pair or most_telling(scanned)
     if pair is not None:
         x, y = pair
-        at = {role: (by_name[x].placed(float(row[x])), by_name[y].placed(float(row[y]))) for role, row in marks.items()}
+        at = {role: np.array([by_name[name].placed(float(row[name])) for name in pair]) for role, row in marks.items()}
         sides = (by_name[x], axis_quantity(data, x)), (by_name[y], axis_quantity(data, y))
         return map_figure(scanned.grids[pair], *sides, data.designs, objective, at, overlays(data.study, x, y))
     if len(cells) == 1:
@@ -285,13 +274,12 @@ def axis_quantity(data: Dataset, name: str) -> ShownQuantity:
     return replace(shown, symbol=name, words=data.definitions.get(name, name))
 
 
-def overlays(study: Study, x: str, y: str) -> list[Overlay]:
-    """Return the known lines of ``[report] curves`` that lie in the plane of the map, in stored units."""
+def overlays(study: Study, x: str, y: str) -> list[tuple[str, Array]]:
+    """Return the known lines of ``[report] curves`` that lie in the plane of the map: label, points in stored units."""
     factors = {axis.name: axis.factor for axis in study.space.axes}
     lines = []
     for curve in study.data.get("report", {}).get("curves", []):
         if {curve["x"], curve["y"]} == {x, y}:
             points = np.asarray(curve["points"], dtype=np.float64) * (factors[curve["x"]], factors[curve["y"]])
-            along = points if curve["x"] == x else points[:, ::-1]
-            lines.append(Overlay(curve["label"], along[:, 0], along[:, 1]))
+            lines.append((curve["label"], points if curve["x"] == x else points[:, ::-1]))
     return lines

@@ -22,19 +22,6 @@ EDGES = (" at its lower bound", " at its upper bound")
 
 
 @dataclass(frozen=True)
-class FrontRow:
-    """The optimum within one bound, in words; ``held`` names the active limits, or those that gave way."""
-
-    bound: str
-    value: str
-    fast: str
-    change: str
-    second: str
-    state: str
-    held: str
-
-
-@dataclass(frozen=True)
 class Front:
     """The front of a dataset: objective, second output, and a point for each bound, the loosest first."""
 
@@ -57,26 +44,21 @@ class Front:
         """Side of its bounds on which the second output lies, in words."""
         return "at least" if self.settings.at_least else "at most"
 
-    def rows(self) -> list[FrontRow]:
-        """Return for every bound the minimised objective within it, its change against the optimum, active limits."""
-        objective, second, optimum = self.objective, self.second, self.data.optimum
-        best = math.nan if optimum is None else float(optimum[objective.name])
-        rows = []
-        for point in self.points:
-            value, missed = float(point[objective.name]), is_missed(point)
-            relaxed, active = str(point["relaxation"]), str(point["active"])
-            rows.append(
-                FrontRow(
-                    bound=f"{self.side} {second.show(float(point['bound']))}",
-                    value="–" if missed else objective.show(value),
-                    fast="" if missed else objective.at_speed(value, self.data.study.speed),
-                    change="" if missed else change(objective, value, best),
-                    second="–" if missed else second.show(compared(second.name, float(point[second.name]))),
-                    state="no design found" if missed else _state(point),
-                    held=_given_way(self.data, relaxed) if missed else _held(active, second.name),
-                )
-            )
-        return rows
+    def change(self, point: dict[str, Any]) -> str:
+        """Return the change of the objective against the optimum."""
+        name, optimum = self.objective.name, self.data.optimum
+        best = math.nan if optimum is None else float(optimum[name])
+        return change(self.objective, float(point[name]), best)
+
+    def reached(self, point: dict[str, Any]) -> float:
+        """Return the second output of a design, swing and stroke by magnitude."""
+        return float(compared(self.second.name, float(point[self.second.name])))
+
+    def held(self, point: dict[str, Any]) -> str:
+        """Name the active limits of a design within a bound, or those that gave way where there is none."""
+        if is_missed(point):
+            return _given_way(self.data, str(point["relaxation"]))
+        return _held(str(point["active"]), self.second.name)
 
     def sentence(self) -> str:
         """Return a sentence about the ends of the front, and about the bounds within which no design was found."""
@@ -109,7 +91,7 @@ class Front:
     def _gap(self) -> str:
         """Name the largest gap of the front, if it is large enough to mention."""
         objective, second, points = self.objective.name, self.second, self.points
-        reached = [float(p["bound"]) if is_missed(p) else compared(second.name, float(p[second.name])) for p in points]
+        reached = [float(p["bound"]) if is_missed(p) else self.reached(p) for p in points]
         values = [math.nan if is_missed(p) else float(p[objective]) for p in points]
         bounds = np.array([float(p["bound"]) for p in points])
         largest = gaps(bounds, np.array(reached), np.array(values))
@@ -126,7 +108,8 @@ def is_missed(point: dict[str, Any]) -> bool:
     return int(point["status"]) == codes.LIMIT_EXCEEDED
 
 
-def _state(point: dict[str, Any]) -> str:
+def search_state(point: dict[str, Any]) -> str:
+    """Tell whether the search within a bound has settled."""
     residual = float(point["kkt_residual"])
     if residual <= KKT:
         return "settled"

@@ -19,7 +19,7 @@ from sweep.pages import rendered
 from sweep.report import answer, tables
 from sweep.report.dataset import Dataset, Row, as_result, chosen, cyclogram_of, read_dataset, read_rows, row_of
 from sweep.report.figures import data_uri, design_map, house_style, save, trade_off
-from sweep.report.front import Front
+from sweep.report.front import Front, is_missed, search_state
 from sweep.report.live import embedded, live, moving, scripts_of
 from sweep.report.made import (
     event_bands,
@@ -111,6 +111,8 @@ def _write(folder: Path, out: Path, say: Say) -> Path:
             errors=tables.error_rows(data, scanned),
             provenance=tables.provenance(data),
             front=Front.of(data),
+            is_missed=is_missed,
+            search_state=search_state,
             optima=optima(data, several),
             optima_left=max(len(several) - CARDS, 0),
             sewn=stitch,

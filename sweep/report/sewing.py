@@ -31,32 +31,21 @@ ON_LIMIT = 1e-9  # mm: an optimum ends on its limits, and exceeds them by the ro
 
 
 @dataclass(frozen=True)
-class SpeedRow:
-    """Sewing at one speed: window of the rise, the end that binds the optimum, shares that keep each moment and all."""
-
-    speed: str
-    window: str
-    binds: str
-    shares: list[str]
-    every: str
-    interval: str
-
-
-@dataclass(frozen=True)
 class Sewn:
-    """Shares of manufactured mechanisms by speed: rows of the stated speeds, curves between them; the answer in words.
+    """Shares of manufactured mechanisms by speed [1/min], (S,) each, and the answer in words.
 
-    ``shares`` (S,) keep all moments, 95 % confidence from ``low`` to ``high``; ``ends`` the least or the most rise.
+    ``shares`` keep all moments, 95 % confidence from ``low`` to ``high``; ``moments`` each of them, ``ends`` the least
+    or the most rise.  ``rows`` are the stated speeds: index, window of the rise, and the end that binds the optimum.
     """
 
     sentence: str
-    moments: tuple[str, ...]
-    rows: tuple[SpeedRow, ...]
+    rows: list[tuple[int, Array, str]]
     count: int
     speeds: Array
     shares: Array
     low: Array
     high: Array
+    moments: dict[str, Array]
     ends: dict[str, Array]
 
 
@@ -79,22 +68,17 @@ def sewn(data: Dataset) -> Sewn | None:
     windows = np.stack(sewing.window(study.family, design[None], stated), axis=-1)[0]
     rooms, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
     meets = {name: room >= 0.0 for name, room in rooms.items()}
-    moments = tuple(name for name in meets if name not in ends)
     meets_all = np.logical_and.reduce(list(meets.values()))
-    rows = tuple(
-        SpeedRow(
-            speed=f"{stated[k] / RPM:.6g}",
-            window=f"{number(float(windows[k, 0]))} to {number(float(windows[k, 1]))}",
-            binds=_binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k),
-            shares=[_percent(float(meets[name][:, at].mean())) for name in (*moments, *ends)],
-            every=_percent(float(meets_all[:, at].mean())),
-            interval=" to ".join(map(_percent, _interval(meets_all[:, at]))),
-        )
-        for k, at in enumerate(np.searchsorted(speeds, stated).tolist())
-    )
+    binds = [
+        _binds(sewing, {end: float(nominal[name][k]) for end, name in sewing.ends.items()}, k)
+        for k in range(len(stated))
+    ]
+    rows = list(zip(np.searchsorted(speeds, stated).tolist(), windows, binds, strict=True))
     low, high = np.array([_interval(one) for one in meets_all.T]).T
-    of_ends = {end: meets[name].mean(axis=0) for end, name in sewing.ends.items()}
-    return Sewn(sentence, moments, rows, len(designs), speeds / RPM, meets_all.mean(axis=0), low, high, of_ends)
+    shares = {name: kept.mean(axis=0) for name, kept in meets.items()}
+    of_moments = {name: share for name, share in shares.items() if name not in ends}
+    of_ends = {end: shares[name] for end, name in sewing.ends.items()}
+    return Sewn(sentence, rows, len(designs), speeds / RPM, meets_all.mean(axis=0), low, high, of_moments, of_ends)
 
 
 def sewing_sentence(rooms: Mapping[str, Array], rpm: Array) -> str:
@@ -141,10 +125,6 @@ def _interval(kept: Mask) -> tuple[float, float]:
 
     interval = binomtest(int(kept.sum()), len(kept)).proportion_ci(method="wilson")
     return float(interval.low), float(interval.high)
-
-
-def _percent(share: float) -> str:
-    return f"{number(100.0 * share, 3)}\u00a0%"
 
 
 def diagram_of_dataset(data: Dataset) -> pd.DataFrame | None:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -160,19 +160,13 @@ def _write(taken: list[tuple[float, float, str, str]], x: float, y: float, words
             return
 
 
-class Bar(NamedTuple):
-    """A bar with its mass data, in words: centre from its first joint, inertia across and along it."""
+def bars(data: Dataset) -> list[tuple[str, str, list[str]]]:
+    """Return the bars with a mass, in the order of the mechanism.
 
-    name: str
-    kind: str
-    mass: str
-    centre: str
-    across: str
-    along: str
-
-
-def bars(data: Dataset) -> list[Bar]:
-    """Return the bars with a mass, in the order of the mechanism."""
+    Returns
+    -------
+    name, kind, and in words mass, centre from its first joint, inertia across and along it
+    """
     family, row = data.study.family, data.result
     rods = [name for name in family.parameter_names if f".{name}".rpartition(".")[2].startswith("rod_")]
     rods = [name for name in rods if row is not None and value_of(row, name) == 1.0]
@@ -195,5 +189,5 @@ def bars(data: Dataset) -> list[Bar]:
             values = (("m", "t", mass), ("com", "mm", 0.5 * length), ("j", "t*mm^2", mass * (length**2 / 12.0 + thick)),
                       ("j", "t*mm^2", 2.0 * mass * thick))  # fmt: skip
             words = [quantity(word, unit).show(value) for word, unit, value in values]
-            result.append(Bar(f"{member}{dot}{body}", "exact" if thick else "slender", *words))
+            result.append((f"{member}{dot}{body}", "exact" if thick else "slender", words))
     return result

@@ -140,7 +140,6 @@ class Fate:
     code: int
     text: str
     count: int
-    percent: float
 
 
 @dataclass(frozen=True)
@@ -228,7 +227,6 @@ def _few_values(study: Study, name: str) -> list[float] | None:
 def fates(data: Dataset, scanned: Scan) -> list[Fate]:
     """Return the number of designs per status in the order of the sweep's checks, feasible ones last."""
     counts = data.counts or scanned.counts
-    total = max(sum(counts.values()), 1)
     order = [codes.INVALID_INPUT, codes.NOT_ADMISSIBLE, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
     failed = sorted(
         (c for c in counts if c != codes.OK), key=lambda c: order.index(c) if c in order else len(order) + c
@@ -236,11 +234,10 @@ def fates(data: Dataset, scanned: Scan) -> list[Fate]:
     rows: list[Fate] = []
     for code in failed:
         if code == codes.LIMIT_EXCEEDED and sum(data.missed.values()) == counts[code]:
-            rows += [Fate(code, words, count, 100.0 * count / total) for words, count in _by_limit(data)]
+            rows += [Fate(code, words, count) for words, count in _by_limit(data)]
         else:
-            rows.append(Fate(code, meaning(code), counts[code], 100.0 * counts[code] / total))
-    passed = counts.get(codes.OK, 0)
-    return [*rows, Fate(codes.OK, "within all limits", passed, 100.0 * passed / total)]
+            rows.append(Fate(code, meaning(code), counts[code]))
+    return [*rows, Fate(codes.OK, "within all limits", counts.get(codes.OK, 0))]
 
 
 def _by_limit(data: Dataset) -> list[tuple[str, int]]:

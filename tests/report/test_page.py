@@ -228,15 +228,15 @@ def test_overlay_is_drawn_in_its_plane_in_stored_units(tmp_path: Path) -> None:
         {"label": "elsewhere", "x": "alpha1", "y": "xi2", "points": [[0.0, 20.0], [90.0, 60.0]]},
     ]
     study = study_from_data(study_data(report={"curves": curves}), "study.toml")
-    (found,) = overlays(study, "a1", "alpha1")
-    assert found.label == "known"
-    np.testing.assert_array_equal(found.x, [10.0, 30.0])
-    np.testing.assert_allclose(found.y, [0.0, np.pi / 2.0], rtol=1e-15)
+    ((label, points),) = overlays(study, "a1", "alpha1")
+    assert label == "known"
+    np.testing.assert_array_equal(points[:, 0], [10.0, 30.0])
+    np.testing.assert_allclose(points[:, 1], [0.0, np.pi / 2.0], rtol=1e-15)
     edges = Cells.of_range("a1", 10.0, 30.0, 2), Cells.of_range("alpha1", 0.0, np.pi / 2.0, 2)
     sides = [(c, quantity(c.name, unit)) for c, unit in zip(edges, ("mm", "rad"), strict=True)]
     grid = Grid(np.ones((2, 2)), np.ones((2, 2)))
     with house_style():
-        figure = map_figure(grid, sides[0], sides[1], 16.0, None, {}, [found])
+        figure = map_figure(grid, sides[0], sides[1], 16.0, None, {}, [(label, points)])
     (line,) = figure.axes[0].get_lines()
     np.testing.assert_allclose(line.get_xydata(), [[10.0, 0.0], [30.0, 90.0]])
 

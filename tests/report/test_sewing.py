@@ -67,7 +67,8 @@ def test_shares_by_speed_have_their_intervals_and_both_ends_of_the_window():
     tolerance = replace(study.tolerance, lengths=4.0 * study.tolerance.lengths, samples=count)
     optimum = dict(study.space.fixed) | accepted["design"]
     found = sewn(SimpleNamespace(study=replace(study, tolerance=tolerance), optimum=optimum))
-    assert found.count == count and [row.speed for row in found.rows] == ["500", "3000", "7000", "8500"]
+    stated = [found.speeds[at] for at, _, _ in found.rows]
+    assert found.count == count and stated == pytest.approx([500.0, 3000.0, 7000.0, 8500.0], rel=1e-15)
     # The least rise falls from 1.5 mm at 500 rpm to 1 mm at 8500 rpm; an uneven shaft passes at its slowest as well.
     slowest = sweep.summarise(study.family, optimum, ["shaft_slowest"], accuracy=1e-8)["shaft_slowest"][0]
     share = slowest / (7000.0 * 2.0 * math.pi / 60.0)
@@ -75,8 +76,8 @@ def test_shares_by_speed_have_their_intervals_and_both_ends_of_the_window():
         accepted["outputs"]["a_rise"] - (1.5 - 0.5 * (share * rpm - 500.0) / 8000.0) for rpm in (500.0, 8500.0)
     )
     assert 0.99 < share < 0.996
-    assert found.rows[0].binds == f"least (slow and loose), {slow:.3g}\u00a0mm"
-    assert found.rows[-1].binds == f"least (fast and thick), {fast:.3g}\u00a0mm"
+    assert found.rows[0][-1] == f"least (slow and loose), {slow:.3g}\u00a0mm"
+    assert found.rows[-1][-1] == f"least (fast and thick), {fast:.3g}\u00a0mm"
     assert 0.5 < found.ends["above"][0] < 1.0 and found.ends["above"][-1] == 1.0
     assert (found.shares <= np.minimum(*found.ends.values())).all()
     # Wilson's interval: shares p with |p - seen| <= z sqrt(p (1 - p)/n), z = 1.96

@@ -48,9 +48,9 @@ def front_of(side: str, status: int = codes.OK) -> Dataset:
 
 
 def test_what_gives_way_is_said_in_the_unit_of_its_table() -> None:
-    (row,) = Front.of(front_of("at_most", codes.LIMIT_EXCEEDED)).rows()
+    front = Front.of(front_of("at_most", codes.LIMIT_EXCEEDED))
     angle = "largest pressure angle of stage 1 by 0.579°"
-    assert row.held == f"{angle}; stroke by 0.2\u00a0mm; largest acceleration has no value"
+    assert front.held(front.points[0]) == f"{angle}; stroke by 0.2\u00a0mm; largest acceleration has no value"
 
 
 def test_bounds_without_a_design_are_said() -> None:
