@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -23,13 +23,13 @@ DIGITS = 6
 SECONDS = "time of the run"
 
 
-class DatedFigure(NamedTuple):
-    """A figure in one night; ``night`` is the index of the night among those shown."""
+class ShownFigure(NamedTuple):
+    """A figure of a study in one night: its heading, its value, the same in a designer's unit, whether it is red."""
 
-    night: int
+    heading: str
     value: float
-    red: bool
     words: str
+    red: bool
 
 
 def write_page(into: Path) -> Path:
@@ -54,8 +54,12 @@ def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> SimpleNa
     last_night, last = mine[-1]
     reports = [night for night, record in mine if record.report and (into / night / name / "report.html").is_file()]
     order = [night.name for night in nights]
-    trends = [_trend(figure, mine, order) for figure in dict.fromkeys(x for _, record in mine for x in record.figures)]
-    trends += [_times(mine, order)] if any(record.seconds is not None for _, record in mine) else []
+    shown = {night: shown_figures(record) for night, record in mine}
+    names = dict.fromkeys(figure for figures in shown.values() for figure in figures)
+    trends = [
+        _trend({order.index(night): figures[figure] for night, figures in shown.items() if figure in figures}, order)
+        for figure in sorted(names, key=SECONDS.__eq__)
+    ]
     return SimpleNamespace(
         name=name,
         report=f"{reports[-1]}/{name}/report.html" if reports else None,
@@ -66,46 +70,35 @@ def study_rows(name: str, nights: Sequence[NightRecord], into: Path) -> SimpleNa
     )
 
 
-def _trend(name: str, mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
-    """Return the trend of a headline figure, in a designer's unit."""
-
-    def shown(record: StudyRecord) -> str:
-        value, unit = record.figures[name], record.units.get(name, "")
-        if name == SHARE:
-            return f"{number(100.0 * value, DIGITS)}\u00a0%"
-        return quantity(name, unit).show(value, DIGITS) if unit else number(value, DIGITS)
-
-    with_it = [(night, record) for night, record in mine if name in record.figures]
-    points = [
-        DatedFigure(order.index(night), record.figures[name], name in record.moved, f"{night}: {shown(record)}")
-        for night, record in with_it
-    ]
-    last = with_it[-1][1]
-    unit = last.units.get(name, "")
-    return _drawn(quantity(name, unit).heading if unit else name, shown(last), points, len(order))
+def shown_figures(record: StudyRecord) -> dict[str, ShownFigure]:
+    """Return the headline figures of a night by name, with the time of its run if something was computed."""
+    figures = {}
+    for name, value in record.figures.items():
+        unit = record.units.get(name, "")
+        shown = quantity(name, unit)
+        words = shown.show(value, DIGITS) if unit else number(value, DIGITS)
+        words = f"{number(100.0 * value, DIGITS)}\u00a0%" if name == SHARE else words
+        figures[name] = ShownFigure(shown.heading if unit else name, value, words, name in record.moved)
+    if record.seconds is not None:
+        words = f"{record.seconds:.3g} s"
+        figures[SECONDS] = ShownFigure(SECONDS, record.seconds, words, record.changed == SLOWER)
+    return figures
 
 
-def _times(mine: Sequence[tuple[str, StudyRecord]], order: Sequence[str]) -> SimpleNamespace:
-    """Return the trend of the run's time, over nights in which something was computed."""
-    points = [
-        DatedFigure(order.index(night), record.seconds, record.changed == SLOWER, f"{night}: {record.seconds:.3g} s")
-        for night, record in mine
-        if record.seconds is not None
-    ]
-    return _drawn(SECONDS, f"{points[-1].value:.3g} s", points, len(order))
-
-
-def _drawn(name: str, value: str, points: Sequence[DatedFigure], nights: int) -> SimpleNamespace:
-    """Place the nights on a line, the smallest value at the bottom and the largest at the top."""
-    values = np.array([point.value for point in points])
+def _trend(figures: Mapping[int, ShownFigure], order: Sequence[str]) -> SimpleNamespace:
+    """Place the nights of a figure on a line, the smallest value at the bottom and the largest at the top."""
+    values = np.array([figure.value for figure in figures.values()])
     span = float(np.ptp(values))
-    x = EDGE + (WIDTH - 2.0 * EDGE) * np.array([p.night / (nights - 1) if nights > 1 else 1.0 for p in points])
+    x = EDGE + (WIDTH - 2.0 * EDGE) * np.array([k / (len(order) - 1) if len(order) > 1 else 1.0 for k in figures])
     share = (values - values.min()) / span if span > 0.0 else np.full(values.size, 0.5)
     y = HEIGHT - EDGE - share * (HEIGHT - 2.0 * EDGE)
-    places = zip(x.round(1).tolist(), y.round(1).tolist(), points, strict=True)
-    dots = [SimpleNamespace(x=across, y=up, red=point.red, words=point.words) for across, up, point in places]
+    dots = [
+        SimpleNamespace(x=across, y=up, red=figure.red, words=f"{order[k]}: {figure.words}")
+        for across, up, (k, figure) in zip(x.round(1).tolist(), y.round(1).tolist(), figures.items(), strict=True)
+    ]
     line = " ".join(f"{dot.x},{dot.y}" for dot in dots)
-    return SimpleNamespace(name=name, value=value, line=line, dots=dots, red=points[-1].red)
+    last = list(figures.values())[-1]
+    return SimpleNamespace(name=last.heading, value=last.words, line=line, dots=dots, red=last.red)
 
 
 def _state(record: StudyRecord) -> str:
