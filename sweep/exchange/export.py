@@ -85,13 +85,10 @@ def write_law(
     if path.suffix.lower() == ".parquet":
         import pyarrow.parquet as pq
 
-        fields = [
-            pa.field(
-                name, pa.array(values).type, metadata={"unit": units.get(name, ""), "definition": texts.get(name, "")}
-            )
-            for name, values in columns.items()
-        ]
-        pq.write_table(pa.table([pa.array(v) for v in columns.values()], schema=pa.schema(fields)), path)
+        table = pa.table(columns)
+        notes = [{"unit": units.get(name, ""), "definition": texts.get(name, "")} for name in columns]
+        fields = [field.with_metadata(note) for field, note in zip(table.schema, notes, strict=True)]
+        pq.write_table(table.cast(pa.schema(fields)), path)
         return
     import pandas as pd
 

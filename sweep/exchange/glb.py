@@ -32,6 +32,7 @@ COLOURS = {
 FLOAT, UINT16 = 5126, 5123
 ARRAY_BUFFER, ELEMENT_BUFFER = 34962, 34963
 SIDES, RINGS = 24, 12
+Z = np.array([0.0, 0.0, 1.0])
 
 
 class GltfModel:
@@ -164,7 +165,7 @@ def _group(model: GltfModel, placed: PlacedPart, times: int, size: float) -> int
         children.append(
             model.node(
                 name=f"axis_{shown_name(joint)}", mesh=model.mesh("bar", "frame"), translation=at.tolist(),
-                rotation=_from_z(axis).as_quat().tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
+                rotation=_shortest(Z, axis).as_quat().tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
             )
         )  # fmt: skip
     name = part.label if part.member or part.stage else "stage"
@@ -174,11 +175,11 @@ def _group(model: GltfModel, placed: PlacedPart, times: int, size: float) -> int
 def _block(model: GltfModel, part: Part, link: Link, colour: str, times: int, thick: float) -> int:
     """Return a block at the joint of a slider, along its line of motion."""
     slides = [part.axes[name] for name, kind in part.kinds.items() if kind == "slide"]
-    axis, reach = slides[0] if slides else np.array([0.0, 0.0, 1.0]), 4.0 * thick
+    axis, reach = slides[0] if slides else Z, 4.0 * thick
     path = part.joints[link.joints[0]] - reach * axis
     node = model.node(
         name=f"{link.name} block", mesh=model.mesh("bar", colour), translation=path[0].tolist(),
-        rotation=_from_z(axis).as_quat().tolist(), scale=[2.2 * thick, 2.2 * thick, 2.0 * reach],
+        rotation=_shortest(Z, axis).as_quat().tolist(), scale=[2.2 * thick, 2.2 * thick, 2.0 * reach],
     )  # fmt: skip
     model.animate(node, times, "translation", path)
     return node
@@ -204,24 +205,17 @@ def _bar(model: GltfModel, name: str, colour: str, start: Array, end: Array, tim
 
 def _following(directions: Array) -> Array:
     """Return quaternions (x, y, z, w) that turn z into each direction, each from the one before by the shortest way."""
-    turns = [_from_z(directions[0])]
+    turns = [_shortest(Z, directions[0])]
     for before, after in pairwise(directions):
         turns.append(_shortest(before, after) * turns[-1])
     return np.array([turn.as_quat() for turn in turns])
 
 
-def _from_z(direction: Array) -> Rotation:
-    from scipy.spatial.transform import Rotation
-
-    if direction[2] < -0.9:  # a half turn about x first, since the shortest way is undefined near -z
-        return _shortest(np.array([0.0, 0.0, -1.0]), direction) * Rotation.from_quat([1.0, 0.0, 0.0, 0.0])
-    return _shortest(np.array([0.0, 0.0, 1.0]), direction)
-
-
 def _shortest(first: Array, second: Array) -> Rotation:
+    """Return the least rotation that turns the first direction into the second."""
     from scipy.spatial.transform import Rotation
 
-    return Rotation.from_quat(np.append(np.cross(first, second), 1.0 + first @ second))
+    return Rotation.align_vectors(second, first)[0]
 
 
 def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
@@ -233,7 +227,7 @@ def _cylinder() -> tuple[Array, Array, NDArray[np.int64]]:
     faces = np.concatenate(
         [np.stack([k, after, after + SIDES], axis=1), np.stack([k, after + SIDES, k + SIDES], axis=1)]
     )
-    return np.vstack([ring, ring + np.array([0.0, 0.0, 1.0])]), np.vstack([ring, ring]), faces
+    return np.vstack([ring, ring + Z]), np.vstack([ring, ring]), faces
 
 
 def _ball() -> tuple[Array, Array, NDArray[np.int64]]:

@@ -208,9 +208,9 @@ def read_points(file: Path, reader: Hardpoints | None = None, *, part: str = "",
         scale = factor(unit, "mm")
     except UnitFault as fault:
         raise InputError("--unit", unit, str(fault), str(file)) from None
-    readers: dict[str, Callable[[Path], tuple[Groups, bool]]] = {".dxf": _of_dxf, ".glb": _of_glb}
+    readers: dict[str, Callable[[Path], Groups]] = {".dxf": _of_dxf, ".glb": _of_glb}
     reads = readers.get(file.suffix.lower())
-    groups, exported = _of_csv(file, scale) if reads is None else reads(file)
+    groups, exported = _of_csv(file, scale) if reads is None else (reads(file), True)
     if not part and len(groups) > 1:
         raise MissingInput("part", f"one of {', '.join(groups)}: name it with --part", str(file))
     if part and part not in groups:
@@ -271,7 +271,7 @@ def _label(member: str, stage: str) -> str:
     return " ".join(word for word in (member, f"stage {stage}" if stage else "") if word)
 
 
-def _of_dxf(file: Path) -> tuple[Groups, bool]:
+def _of_dxf(file: Path) -> Groups:
     """Return named points and axes of the front views, which keep the third coordinate."""
     ezdxf = ezdxf_or_refuse()
     try:
@@ -289,10 +289,10 @@ def _of_dxf(file: Path) -> tuple[Groups, bool]:
         groups.setdefault(label, {})[name] = [scale * float(x) for x in at]
     if not groups:
         raise InputError("file", file.name, "a drawing with named points, by sweep export", str(file))
-    return groups, True
+    return groups
 
 
-def _of_glb(file: Path) -> tuple[Groups, bool]:
+def _of_glb(file: Path) -> Groups:
     """Return joints of the first pose and axes; coordinates are float32."""
     data = file.read_bytes()
     if len(data) < 20 or data[:4] != b"glTF":
@@ -313,4 +313,4 @@ def _of_glb(file: Path) -> tuple[Groups, bool]:
                 points[node["name"]] = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)]
             elif "mesh" in node:
                 points[node["name"]] = (millimetres * np.add(node["translation"], group["translation"])).tolist()
-    return groups, True
+    return groups
