@@ -139,8 +139,7 @@ def pareto(folder: str | Path, first: str, second: str) -> pd.DataFrame:
 def non_dominated(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.intp]:
     """Return the indices of non-dominated points, sorted by x; smaller is better, of equal points the first counts."""
     order: NDArray[np.intp] = np.lexsort((y, x))
-    front: NDArray[np.intp] = order[np.diff(np.minimum.accumulate(y[order]), prepend=np.inf) < 0.0]
-    return front
+    return order[np.diff(np.minimum.accumulate(y[order]), prepend=np.inf) < 0.0]
 
 
 def _chosen(

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,6 +26,16 @@ from sweep.families.base import Array, Columns, Parameter
 from sweep.numerics.records import Mask
 
 ARC_ENDS = 8
+
+Range: TypeAlias = tuple[str, Callable[[Array], Mask]]  # allowed values in words, and where they hold
+RANGES: Mapping[str, Range] = {
+    "swing": ("an angle below one turn, or its negative", lambda x: (x != 0.0) & (np.abs(x) < TWO_PI)),
+    "stroke": ("a length, positive or negative, not zero", lambda x: x != 0.0),
+    "phi0": ("an angle between 0 and 360 deg", lambda x: (x > 0.0) & (x < TWO_PI)),
+}
+UPWARDS: Range = ("a positive length (a mirrored mechanism whose crank turns back does the rest)", lambda x: x > 0.0)
+PRESCRIBED = {**RANGES, "stroke": UPWARDS}  # in a study
+ANY_PLACE: Range = ("an angle from 0 to 360 deg", lambda x: (x >= 0.0) & (x <= TWO_PI))
 
 
 class LocusSolutions(NamedTuple):
@@ -83,8 +93,10 @@ class Locus:
             for a missing or misspelt column, a bad number, a swing or stroke of zero, angles outside one turn.
         """
         matrix, _ = design_matrix(self, table)
-        for name, allowed, bad in self._ranges(matrix):
-            refuse_rows(bad, matrix[:, self.parameter_names.index(name)], name, allowed)
+        for name, values in zip(self.parameter_names, matrix.T, strict=True):
+            if name in RANGES:
+                allowed, holds = RANGES[name]
+                refuse_rows(~holds(values), values, name, allowed)
         return matrix
 
     def solve(self, matrix: Array) -> LocusSolutions:
@@ -98,19 +110,6 @@ class Locus:
         self.kernel(matrix, *roots, status, failed, designs, *results.values())
         columns |= results
         return LocusSolutions(designs, status, failed, columns["phi1"], columns["start"], columns["phi0"])
-
-    def _ranges(self, matrix: Array) -> list[tuple[str, str, Mask]]:
-        columns = dict(zip(self.parameter_names, matrix.T, strict=True))
-        ranges = []
-        if "swing" in columns:
-            swing = np.abs(columns["swing"])
-            ranges.append(("swing", "an angle between 0 and 2 pi, or its negative", ~((swing > 0) & (swing < TWO_PI))))
-        if "stroke" in columns:
-            ranges.append(("stroke", "a length, positive or negative, not zero", columns["stroke"] == 0.0))
-        if "phi0" in columns:
-            phi0 = columns["phi0"]
-            ranges.append(("phi0", "an angle between 0 and 2 pi", ~((phi0 > 0) & (phi0 < TWO_PI))))
-        return ranges
 
 
 _SWING = Parameter("swing", "angle", "rocker angle from the extended to the folded position, with its sign")
@@ -270,19 +269,8 @@ class OnLocus:
 
     def allowed(self, name: str, values: Array) -> str | None:
         """Return the allowed range of a prescribed output if values [mm, rad] lie outside of it; otherwise None."""
-        stem = name.removesuffix(self.number) if self.number else name
-        if stem == "swing":
-            bad, words = ~((values != 0.0) & (np.abs(values) < TWO_PI)), "an angle below one turn, or its negative"
-        elif stem == "stroke":
-            bad, words = (
-                ~(values > 0.0),
-                "a positive length (a mirrored mechanism whose crank turns back does the rest)",
-            )
-        elif stem == "phi0":
-            bad, words = ~((values > 0.0) & (values < TWO_PI)), "an angle between 0 and 360 deg"
-        else:
-            bad, words = ~((values >= 0.0) & (values <= TWO_PI)), "an angle from 0 to 360 deg"
-        return words if bad.any() else None
+        words, holds = PRESCRIBED.get(name.removesuffix(self.number), ANY_PLACE)
+        return None if holds(values).all() else words
 
     def links(self, columns: Mapping[str, Array]) -> tuple[dict[str, Array], Status]:
         """Return the parameters in ``made``, (n,) each, and the status of each design.
