@@ -112,6 +112,11 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     return [*lines, "", "estimated cost, without the first compilation of the kernels", *aligned(costs)]
 
 
+def section(heading: str, rows: Sequence[str]) -> list[str]:
+    """Return rows under their heading, after an empty line; nothing without rows."""
+    return ["", heading, *rows] if rows else []
+
+
 def _speed(study: Study) -> list[str]:
     """Give the speed of the scene, and the speeds among a family's own parameters, which it does not set."""
     if study.speed is None:
@@ -149,12 +154,11 @@ def _brake(seconds: float | None) -> str:
 
 def _searches(cost: Estimate, rows: Sequence[tuple[str, float, float]]) -> list[str]:
     """Describe the steps after the sweep with their time, then the whole run."""
-    if not rows:
-        return []
-    least, most = (cost.seconds + sum(times) for times in list(zip(*rows, strict=True))[1:])
-    all_of_it = (*rows, ("the whole run", least, most))
+    least = cost.seconds + sum(typical for _, typical, _ in rows)
+    most = cost.seconds + sum(end for _, _, end in rows)
+    all_of_it = (*rows, ("the whole run", least, most)) if rows else ()
     words = [(name, f"about {duration(typical)}, at most {duration(end)}") for name, typical, end in all_of_it]
-    return ["", "what follows the sweep, by timed evaluations of a design of this study", *aligned(words)]
+    return section("what follows the sweep, by timed evaluations of a design of this study", aligned(words))
 
 
 def _mechanism(family: Family) -> list[str]:
@@ -166,11 +170,9 @@ def _mechanism(family: Family) -> list[str]:
 
 def _left_out(study: Study) -> list[str]:
     names = [name for name in main_outputs(study.family) if name not in study.want]
-    if not names:
-        return []
     further = len(names) - NAMED
     text = ", ".join(names[:NAMED]) + (f" and {further} more, see sweep families" if further > 0 else "")
-    return ["", "will not be computed, because nothing asks for it", f"  {text}"]
+    return section("will not be computed, because nothing asks for it", [f"  {text}"] if names else [])
 
 
 def _computed(study: Study) -> list[str]:
@@ -254,12 +256,9 @@ def _effects(study: Study, sample: Pilot) -> list[str]:
     others = left_out(bare, study.want)
     if not others and bare is study.family:
         return []
-    lines = []
-    if bare is not study.family:
-        lines += ["", "effects, with their share of the cost at equal numbers of poses"]
-        lines += aligned(tree(bare, study.want, POSES))
-    if others:
-        lines += ["", "effects not computed, because nothing asks for them", f"  {', '.join(others)}"]
+    shares = aligned(tree(bare, study.want, POSES)) if bare is not study.family else []
+    lines = section("effects, with their share of the cost at equal numbers of poses", shares)
+    lines += section("effects not computed, because nothing asks for them", _listed(others))
     designs, tried = spread_rows(sample.kept, ADVISED), sample.tried
     if not len(designs):
         designs, tried = feasible_designs(study, ADVISED)
@@ -268,15 +267,17 @@ def _effects(study: Study, sample: Pilot) -> list[str]:
         designs = spread_designs(study, ADVISED)
         which = f"by {how_many(len(designs), 'design')} spread over the space: none of {tried} tried keeps all limits"
     rods = [p.name for p in study.family.parameters if p.unless and study.space.fixed.get(p.name) == 1.0]
-    if rods:
-        lines += ["", "bodies without centre and inertia are slender rods between their joints", f"  {', '.join(rods)}"]
-    if points := _points(study):
-        lines += ["", "masses in the joints of their bodies, as centre and inertia are 0", f"  {', '.join(points)}"]
-    lines += _piercing(study, designs)
-    lines += _late(study)
-    rules = findings(bare, study.family, designs, study.want)
-    advice = ["", f"what matters here, {which}; the choice is yours", *(f"  {finding.words}" for finding in rules)]
-    return lines + (advice if rules else [])
+    lines += section("bodies without centre and inertia are slender rods between their joints", _listed(rods))
+    lines += section("masses in the joints of their bodies, as centre and inertia are 0", _listed(_points(study)))
+    lines += section("fabric that the tool does not enter on its way", _piercing(study, designs))
+    lines += section("values that miss the accuracy asked", _late(study))
+    advice = [f"  {finding.words}" for finding in findings(bare, study.family, designs, study.want)]
+    return lines + section(f"what matters here, {which}; the choice is yours", advice)
+
+
+def _listed(names: Sequence[str]) -> list[str]:
+    """Return names in one row of a section, if there are any."""
+    return [f"  {', '.join(names)}"] if names else []
 
 
 def _late(study: Study) -> list[str]:
@@ -285,7 +286,7 @@ def _late(study: Study) -> list[str]:
     status = design_outputs(study.family, designs, study.want, study.accuracy, study.window)["status"]
     late = np.count_nonzero(status == NOT_CONVERGED)
     words = f"{late} of {how_many(len(designs), 'design')} spread over the space: {meaning(NOT_CONVERGED)}"
-    return ["", "values that miss the accuracy asked", f"  {words}"] if late else []
+    return [f"  {words}"] if late else []
 
 
 def _piercing(study: Study, designs: Array) -> list[str]:
@@ -304,7 +305,7 @@ def _piercing(study: Study, designs: Array) -> list[str]:
                 ends = f"{way[some].min():.4g} to {way[some].max():.4g} mm"
                 count = f"{some.sum()} of {how_many(len(designs), 'design')}"
                 lines.append(f"  {at} = {places} mm is outside {known.passing} = {ends} of {count}: the force {effect}")
-    return ["", "fabric that the tool does not enter on its way", *lines] if lines else []
+    return lines
 
 
 def _points(study: Study) -> list[str]:

@@ -160,10 +160,9 @@ class Card:
     """
 
     title: str
+    group: DistinctOptimum
     objective: str
     against: str
-    starts: int
-    mirrored: int
     made: str
     sizes: list[tuple[str, str]]
     extras: list[tuple[str, str]]
@@ -188,10 +187,9 @@ def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[Card]:
         cards.append(
             Card(
                 title=title,
+                group=group,
                 objective=f"{objective.words} {objective.show(value)}",
                 against="" if k == 0 else change(objective, value, best),
-                starts=group.starts,
-                mirrored=group.mirrored,
                 made=_made(data, group.row),
                 sizes=[(x.name, x.value) for x in shown if group.row[x.name] or x.name not in tilts],
                 extras=_extras(data, group.row),
