@@ -9,7 +9,6 @@ parameters in six combinations, (28) of docs/takeup.md.  Fixing e, a or alpha re
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -97,65 +96,56 @@ def fit_eyelet(
     if not (np.isfinite(weight).all() and (weight >= 0.0).all() and weight.sum() > 0.0):
         raise InputError("weights", weight.min(), "numbers that are not negative, one of them positive", "weights")
     matrix, _ = design_matrix(family("eyelet"), starts)
-    problem = _Problem(np.cos(angles)[None], np.sin(angles)[None], wanted, weight / weight.sum(), sought)
-    rows = [problem.solved(start) for start in matrix]
+    given = np.cos(angles)[None], np.sin(angles)[None], wanted, weight / weight.sum()
+    rows = [_fitted(start, sought, *given) for start in matrix]
     frame = pd.DataFrame(rows).sort_values("rms", kind="stable", ignore_index=True)
     frame.attrs["units"] = parameter_units(family("eyelet").parameters) | {"rms": "length", "largest": "length"}
     return TakeUpFit(frame)
 
 
-@dataclass(frozen=True)
-class _Problem:
-    cos: Array
-    sin: Array
-    wanted: Array
-    weights: Array
-    sought: list[int]
+def _fitted(
+    start: Array, sought: list[int], cos: Array, sin: Array, wanted: Array, weights: Array
+) -> dict[str, float | str]:
+    """Return the eyelet fitted from one start, as a row of the table."""
+    from scipy.optimize import least_squares
 
-    def solved(self, start: Array) -> dict[str, float | str]:
-        """Return the eyelet fitted from one start, as a row of the table."""
-        from scipy.optimize import least_squares
+    unit = float(np.abs(start[[SOUGHT.index(name) for name in LENGTHS]]).max())
+    scale = np.array([unit if SOUGHT[k] in LENGTHS else 1.0 for k in sought])
+    low = np.array([1e-9 * unit if SOUGHT[k] == "a" else -np.inf for k in sought])
+    status = np.empty(cos.shape, np.uint8)
 
-        unit = float(np.abs(start[[SOUGHT.index(name) for name in LENGTHS]]).max())
-        scale = np.array([unit if SOUGHT[k] in LENGTHS else 1.0 for k in self.sought])
-        low = np.array([1e-9 * unit if SOUGHT[k] == "a" else -np.inf for k in self.sought])
+    def design(x: Array) -> Array:
+        row = start[None].copy()
+        row[0, sought] = x
+        return row
 
-        fit = least_squares(
-            partial(self.errors, start), start[self.sought], partial(self.slopes, start), x_scale=scale,
-            bounds=(low, np.inf), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=500,
-        )  # fmt: skip
-        design = self.design(start, fit.x)
-        residuals = self.lengths(design) - self.wanted
-        design[0, STORE] = self.weights @ residuals
-        residuals = residuals - design[0, STORE]
-        _, singular_values, directions = np.linalg.svd(self.slopes(start, fit.x) * scale, full_matrices=False)
-        weak = directions[singular_values <= LEAST_RANK * singular_values[0]]
-        names = [SOUGHT[k] for i, k in enumerate(self.sought) if (np.abs(weak[:, i]) > SHARE).any()]
-        values: dict[str, float | str] = dict(zip(family("eyelet").parameter_names, design[0], strict=True))
-        rms = float(np.sqrt(self.weights @ residuals**2))
-        return values | {"rms": rms, "largest": float(np.abs(residuals).max()), "undetermined": ",".join(names)}
+    def beside(x: Array) -> Array:
+        """Return P less what is wanted; what P_h makes good is in it."""
+        length = np.empty(cos.shape)
+        eyelet.poses(design(x), cos, sin, status, eyelet.Outputs(None, None, None, length, None, None, None, None))
+        return np.asarray(length[0] - wanted)
 
-    def design(self, start: Array, x: Array) -> Array:
-        design = start[None].copy()
-        design[0, self.sought] = x
-        return design
-
-    def lengths(self, design: Array) -> Array:
-        status, length = np.empty(self.cos.shape, np.uint8), np.empty(self.cos.shape)
-        outputs = eyelet.Outputs(None, None, None, length, None, None, None, None)
-        eyelet.poses(design, self.cos, self.sin, status, outputs)
-        lengths: Array = length[0]
-        return lengths
-
-    def errors(self, start: Array, x: Array) -> Array:
+    def errors(x: Array) -> Array:
         """Return the weighted errors of P, with the best P_h."""
-        residuals = self.lengths(self.design(start, x)) - self.wanted
-        return np.sqrt(self.weights) * (residuals - self.weights @ residuals)
+        residuals = beside(x)
+        return np.sqrt(weights) * (residuals - weights @ residuals)
 
-    def slopes(self, start: Array, x: Array) -> Array:
-        jacobian = np.empty((len(SOUGHT), *self.cos.shape))
-        eyelet.length_sensitivities(
-            self.design(start, x), self.cos, self.sin, jacobian, np.empty(self.cos.shape, np.uint8)
-        )
-        rates = jacobian[self.sought, 0].T
-        return np.sqrt(self.weights)[:, None] * (rates - self.weights @ rates)
+    def slopes(x: Array) -> Array:
+        jacobian = np.empty((len(SOUGHT), *cos.shape))
+        eyelet.length_sensitivities(design(x), cos, sin, jacobian, status)
+        rates = jacobian[sought, 0].T
+        return np.sqrt(weights)[:, None] * (rates - weights @ rates)
+
+    fit = least_squares(
+        errors, start[sought], slopes, x_scale=scale, bounds=(low, np.inf), xtol=1e-15, ftol=1e-15, gtol=1e-15,
+        max_nfev=500,
+    )  # fmt: skip
+    found, residuals = design(fit.x), beside(fit.x)
+    found[0, STORE] = weights @ residuals
+    residuals = residuals - found[0, STORE]
+    _, singular_values, directions = np.linalg.svd(slopes(fit.x) * scale, full_matrices=False)
+    weak = directions[singular_values <= LEAST_RANK * singular_values[0]]
+    names = [SOUGHT[k] for i, k in enumerate(sought) if (np.abs(weak[:, i]) > SHARE).any()]
+    values: dict[str, float | str] = dict(zip(family("eyelet").parameter_names, found[0], strict=True))
+    rms = float(np.sqrt(weights @ residuals**2))
+    return values | {"rms": rms, "largest": float(np.abs(residuals).max()), "undetermined": ",".join(names)}
