@@ -268,8 +268,8 @@ def sample_block_both(count: int, at: Array, table: CosSin, of_p: Array, of_q: A
 
 
 @inline
-def mark_peaks(count: int, size: Array) -> None:
-    """Mark the local maxima of at least 60 % among the samples of :func:`sample_block`, as a sum of powers of two."""
+def mark_peaks(count: int, size: Array, share: float) -> None:
+    """Mark the samples of :func:`sample_block` that are local maxima of ``share`` of the highest, by powers of two."""
     before, begin, end, after = _row(size, 0), _row(size, 1), _row(size, FEWEST), _row(size, FEWEST + 1)
     for k in range(count):
         before[k], after[k] = end[k], begin[k]
@@ -279,7 +279,7 @@ def mark_peaks(count: int, size: Array) -> None:
     for i in range(1, FEWEST + 1):
         here = _row(size, i)
         for k in range(count):
-            floor[k] = largest(floor[k], 0.6 * here[k])
+            floor[k] = largest(floor[k], share * here[k])
     mark = 1.0
     for i in range(1, FEWEST + 1):
         before, here, after = _row(size, i - 1), _row(size, i), _row(size, i + 1)
@@ -333,14 +333,14 @@ def _marks(begin: int, width: int, floor: float, size: Array) -> int:
 
 
 @inline
-def list_peaks(at: Array, k: int, table: CosSin, n: int, size: Array, m: Array, count: int) -> int:
-    """Append the local maxima among the samples of one design by :func:`sample`; none if there are too many."""
+def list_peaks(at: Array, k: int, table: CosSin, n: int, share: float, size: Array, m: Array, count: int) -> int:
+    """Append the local maxima of ``share`` of the highest among samples by :func:`sample`; none if too many."""
     most = 0.0
     for i in range(n):
         most = largest(most, size[i])
     length, width = count, min(n, 64)
     for begin in range(0, n, width):
-        marks = _marks(begin, width, 0.6 * most, size)
+        marks = _marks(begin, width, share * most, size)
         length = list_marked(marks, at, k, table, size, Samples(begin, 1, n, begin), m, length)
         if length - count > MOST_PEAKS:
             return count

@@ -35,12 +35,12 @@ def _lowest(bits):
 
 @kernel
 def _listed_of_one(at, table, size, n, m):
-    return list_peaks(at, 0, table, n, size, m, 0)
+    return list_peaks(at, 0, table, n, SHARE, size, m, 0)
 
 
 @kernel
 def _listed_of_block(at, table, size, lengths, m):
-    mark_peaks(BLOCK, size)
+    mark_peaks(BLOCK, size, SHARE)
     count = 0
     for k in range(BLOCK):
         count = list_marked(int(size[MARKS + k]), at, k, table, size, Samples(k, BLOCK, FEWEST, 0), m, count)
