@@ -123,6 +123,8 @@ def _refined(scene: Scene, rubs: bool, run: Callable[[Scene, tuple[int, ...]], C
 def _solved(scene: Scene, phi: Array, rubs: bool, grids: tuple[int, ...]) -> tuple[dict[str, Array], Status]:
     """Return design outputs and curves at phi by name, and the status."""
     found, status = on_finer_grids(scene, phi, grids, partial(_solve, rubs, grids[-1]))
+    for values in found.values():
+        values[status == st.NOT_CONVERGED] = np.nan
     return {f"{name}{SUFFIX[rubs]}": x for name, x in found.items()}, status
 
 

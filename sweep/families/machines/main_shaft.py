@@ -153,9 +153,10 @@ def _numbers(shaft: ShaftTorque, machine: Machine, designs: Array) -> dict[str, 
         coarsest = LEFT if size == FINER[-1] else RESOLVED
         part, codes = steady(inertia, excess, speed[rows], motor, np.zeros((1, 1)), coarsest)
         np.copyto(codes, poses, where=poses != st.OK)
-        return {key: np.where(codes == st.OK, part[key], np.nan) for key in (*NUMBERS, "energy_error")}, codes
+        return {key: part[key] for key in (*NUMBERS, "energy_error")}, codes
 
     found, status = on_first_grid(least_samples(machine, designs, (shaft.name,)), (*GRIDS, *FINER), on_grid)
+    found = {key: np.where(status == st.OK, values, np.nan) for key, values in found.items()}
     return found | {"status": status, "mean": np.abs(speed)}
 
 

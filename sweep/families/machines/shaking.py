@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 ORDERS = {1: "first", 2: "second"}  # harmonics of the main shaft's turn
 SAME = 1e-12  # relative difference of speeds that is rounding of gear ratios
-GRIDS = (64, 128, 256, 512, 1024)  # samples of a turn; the first grid that resolves the orders is used
+GRIDS = (64, 128, 256, 512, 1024, 4096)  # samples of a turn; the first grid that resolves the orders is used
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,9 @@ class Shaking(Relation):
 
         def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
             asked = [o.name for o in self.numbers if o.name in wanted]
-            least = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked])
+            least, grids = least_samples(machine, designs, [name.rpartition("_order")[0] for name in asked]), GRIDS
+            if accuracy.samples is not None:
+                least, grids = np.zeros(len(designs)), (accuracy.samples,)
 
             def on_grid(rows: Indices, samples: int) -> tuple[dict[str, Array], Status]:
                 codes, amplitudes = _amplitudes(machine, designs[rows], asked, samples)
@@ -173,7 +175,7 @@ class Shaking(Relation):
                         codes[(codes == st.OK) & ~(err <= accuracy.target * size)] = st.NOT_CONVERGED
                 return found, codes
 
-            found, status = on_first_grid(least, GRIDS if accuracy.samples is None else (accuracy.samples,), on_grid)
+            found, status = on_first_grid(least, grids, on_grid)
             return found | {"status": status}
 
         return Step(f"orders of {self.name}", self.numbers, run, work=Work.LONG, cost=lambda accuracy: 5e4)
