@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 ORDERS = {1: "first", 2: "second"}  # harmonics of the main shaft's turn
 SAME = 1e-12  # relative difference of speeds that is rounding of gear ratios
-GRIDS = (64, 128, 256, 512, 1024, 4096)  # samples of a turn; the first grid that resolves the orders is used
+# Samples of a turn; the first grid that resolves the orders is used.
+GRIDS: tuple[int, ...] = (64, 128, 256, 512, 1024, 4096)
 
 
 @dataclass(frozen=True)
