@@ -8,6 +8,7 @@ plain sequence with scipy's bit for bit.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,51 +18,11 @@ from sweep.families.base import Array
 
 INDEX_BITS = 40
 
-# Primitive polynomial (leading and last coefficient included) and first direction integers of each dimension:
 # S. Joe and F. Y. Kuo, Constructing Sobol sequences with better two-dimensional projections, SIAM J. Sci. Comput. 30
-# (2008), file new-joe-kuo-6.21201, dimensions 1 to 40.
-_JOE_KUO = (
-    (1, (1,)),
-    (3, (1,)),
-    (7, (1, 3)),
-    (11, (1, 3, 1)),
-    (13, (1, 1, 1)),
-    (19, (1, 1, 3, 3)),
-    (25, (1, 3, 5, 13)),
-    (37, (1, 1, 5, 5, 17)),
-    (41, (1, 1, 5, 5, 5)),
-    (47, (1, 1, 7, 11, 19)),
-    (55, (1, 1, 5, 1, 1)),
-    (59, (1, 1, 1, 3, 11)),
-    (61, (1, 3, 5, 5, 31)),
-    (67, (1, 3, 3, 9, 7, 49)),
-    (91, (1, 1, 1, 15, 21, 21)),
-    (97, (1, 3, 1, 13, 27, 49)),
-    (103, (1, 1, 1, 15, 7, 5)),
-    (109, (1, 3, 1, 15, 13, 25)),
-    (115, (1, 1, 5, 5, 19, 61)),
-    (131, (1, 3, 7, 11, 23, 15, 103)),
-    (137, (1, 3, 7, 13, 13, 15, 69)),
-    (143, (1, 1, 3, 13, 7, 35, 63)),
-    (145, (1, 3, 5, 9, 1, 25, 53)),
-    (157, (1, 3, 1, 13, 9, 35, 107)),
-    (167, (1, 3, 1, 5, 27, 61, 31)),
-    (171, (1, 1, 5, 11, 19, 41, 61)),
-    (185, (1, 3, 5, 3, 3, 13, 69)),
-    (191, (1, 1, 7, 13, 1, 19, 1)),
-    (193, (1, 3, 7, 5, 13, 19, 59)),
-    (203, (1, 1, 3, 9, 25, 29, 41)),
-    (211, (1, 3, 5, 13, 23, 1, 55)),
-    (213, (1, 3, 7, 3, 13, 59, 17)),
-    (229, (1, 3, 1, 3, 5, 53, 69)),
-    (239, (1, 1, 5, 5, 23, 33, 13)),
-    (241, (1, 1, 7, 7, 1, 61, 123)),
-    (247, (1, 1, 7, 9, 13, 61, 49)),
-    (253, (1, 3, 3, 5, 3, 55, 33)),
-    (285, (1, 3, 1, 15, 31, 13, 49, 245)),
-    (299, (1, 3, 5, 15, 31, 59, 63, 97)),
-    (301, (1, 3, 1, 11, 11, 11, 77, 249)),
-)
+# (2008), file new-joe-kuo-6.21201, dimensions 1 to 40.  Of each: degree s of the primitive polynomial, its coefficients
+# but the first and the last as digits of a, and the first s direction integers.
+_TABLE = Path(__file__).with_name("joe_kuo.txt")
+_JOE_KUO = [[int(number) for number in row.split()] for row in _TABLE.read_text("utf-8").splitlines()[1:]]
 DIMENSIONS = len(_JOE_KUO)
 
 
@@ -120,11 +81,10 @@ class Sobol:
 
 def direction_numbers(dimension: int) -> list[int]:
     """Return V_1 ... V_INDEX_BITS as integers of BITS digits, by the recurrence of the primitive polynomial."""
-    polynomial, first = _JOE_KUO[dimension]
-    degree = polynomial.bit_length() - 1
+    _, degree, inner, *m = _JOE_KUO[dimension]
     if degree == 0:  # the first dimension is the van der Corput sequence
         return [1 << (BITS - 1 - j) for j in range(INDEX_BITS)]
-    m = list(first)
+    polynomial = 1 << degree | inner << 1 | 1
     for j in range(degree, INDEX_BITS):
         new = m[j - degree] ^ (m[j - degree] << degree)
         for i in range(1, degree):
