@@ -27,7 +27,9 @@ from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.dataset import SAMPLES, random_designs, sample_seconds
 from sweep.optimise.starts.posing import problem_of
 from sweep.optimise.starts.proportions import POPULATIONS, SWEPT
-from sweep.reductions.steps import certified_names, is_windowed
+from sweep.quantities.kinds import is_windowed
+from sweep.quantities.resolve import resolve
+from sweep.reductions.steps import certified_names
 from sweep.study.load import study_from_data, with_accuracy
 from sweep.study.study import OptimiseSettings, Study
 
@@ -233,7 +235,9 @@ def neighbours(study: Study) -> tuple[tuple[str, Study], ...]:
         digits = (("one digit less", 10.0 * target), ("one digit more", 0.1 * target))
         variants = [(words, with_accuracy(study, t)) for words, t in digits if FINEST_TARGET <= t <= COARSEST_TARGET]
         wanted = [name for name in certified_names(study.family) if name in study.want]
-        provable = [name for name in wanted if not (study.window and is_windowed(study.family, name))]
+        provable = [
+            name for name in wanted if not (study.window and is_windowed(study.family, resolve(study.family, name)))
+        ]
         if study.accuracy.certify:
             variants.append(("without the proof", with_accuracy(study, certify=False)))
         elif provable:

@@ -71,23 +71,25 @@ class Parameter:
         return " or ".join(f"{x:+g}" if signed else f"{x:g}" for x in choices)
 
 
-WORDS = {
-    "length": "mm",
-    "angle": "rad",
-    "mass": "t",
-    "line_mass": "t/mm",
-    "inertia": "t*mm^2",
-    "force": "N",
-    "torque": "N*mm",
-    "pressure": "MPa",
-    "stiffness": "N/mm",
-    "damping": "N*s/mm",
-    "rotary_damping": "N*mm*s",
-    "speed": "rad/s",
-    "angular_acceleration": "rad/s^2",
-    "acceleration": "mm/s^2",
-    "time": "s",
+# Internal unit of each kind of quantity, and how it may be written, for messages.
+QUANTITIES = {
+    "length": ("mm", "a length, in mm, um, cm, m or inch"),
+    "angle": ("rad", "an angle, in deg, rad, mrad or rev"),
+    "mass": ("t", "a mass, in kg, g, t or lb"),
+    "line_mass": ("t/mm", "a mass per length, in g/mm, kg/m or t/mm"),
+    "inertia": ("t*mm^2", "an inertia, in kg*mm^2, g*mm^2, kg*m^2 or t*mm^2"),
+    "force": ("N", "a force, in N, kN or lbf"),
+    "torque": ("N*mm", "a torque, in N*mm or N*m"),
+    "pressure": ("MPa", "a pressure, in MPa, N/mm^2 or kN/m^2"),
+    "stiffness": ("N/mm", "a stiffness, in N/mm, N/m or kN/mm"),
+    "damping": ("N*s/mm", "a damping, in N*s/mm or N*s/m"),
+    "rotary_damping": ("N*mm*s", "a torque over a speed, in N*m/rpm, N*m*s or N*mm*s"),
+    "speed": ("rad/s", "a speed of rotation, in rpm, rad/s or deg/s"),
+    "angular_acceleration": ("rad/s^2", "an angular acceleration, in rad/s^2"),
+    "acceleration": ("mm/s^2", "an acceleration, in m/s^2 or mm/s^2"),
+    "time": ("s", "a time, in s, ms, min or h"),
 }
+WORDS = {word: unit for word, (unit, _) in QUANTITIES.items()}
 PER_RADIAN = "length/rad"  # of a speed by the crank angle with a name that is no derivative's, unlike ds
 _WORD = re.compile(r"[a-z_]{2,}")
 _PRODUCT = re.compile(r"(1|rad|s|N|[a-z_]{2,})(\^[2-9])?([*/](rad|s|N|[a-z_]{2,})(\^[2-9])?)*")

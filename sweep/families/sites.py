@@ -1,8 +1,9 @@
-"""Points and axes of a member for relations and tools: joints of all stages, fixed axes, tip, eye, blades."""
+"""Points and axes of a member: joints of all stages, fixed axes, tip, eye, blades; points of relations and tools."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -162,3 +163,49 @@ def _on_coupler(member: Member) -> Site:
         return [point[0] - eye[1] / length * along[1], point[1] + eye[1] / length * along[0], point[2] + eye[2]]
 
     return Site(len(member.family.stages) - 1, (*_named(joints[0]), *_named(joints[1])), at)
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A point of a relation: one of a member, one at the distance ``far`` along a line from it, or a fixed one ``at``.
+
+    ``on`` and ``line`` are dotted names of the point and of the direction, "" for none.
+    """
+
+    on: str = ""
+    line: str = ""
+    far: float = 0.0
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def needs(self, moving: bool) -> set[str]:
+        """Return the names of the coordinates of point and line, with velocities if ``moving``."""
+        return components(self.on, self.line, rate_of(self.on) if moving else "")
+
+    def position(self, found: Mapping[str, Any]) -> list[Any]:
+        """Return the coordinates of the point, each (n, m) or a number."""
+        if not self.on:
+            return list(self.at)
+        start = vector_of(self.on, found)
+        if not self.line:
+            return start
+        return [x + self.far * along for x, along in zip(start, vector_of(self.line, found), strict=True)]
+
+    def velocity(self, found: Mapping[str, Any]) -> list[Any]:
+        """Return the derivative of the coordinates by the main shaft's angle, (n, m): a needle keeps its direction."""
+        return vector_of(rate_of(self.on), found) if self.on else [0.0, 0.0, 0.0]
+
+
+def rate_of(name: str) -> str:
+    """Return the dotted name of the velocity of a point; "" for a name without a dot."""
+    member, dot, own = name.partition(".")
+    return f"{member}.d{own}" if dot else ""
+
+
+def components(*names: str) -> set[str]:
+    """Return the names of the components of vectors in the machine's frame; "" is none."""
+    return {f"{name}_{axis}" for name in names if name for axis in AXES}
+
+
+def vector_of(name: str, found: Mapping[str, Any]) -> list[Any]:
+    """Return the components of a vector in the machine's frame."""
+    return [found[f"{name}_{axis}"] for axis in AXES]

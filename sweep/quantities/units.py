@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from sweep.errors import InputError, nearest
-from sweep.families.parameter import spelt_out
+from sweep.families.parameter import QUANTITIES, spelt_out
 
 # Base units, then derived units as a factor and base units; an angle is a dimension, so 45 is not 45 rad.
 _BASE = ("mm", "rad", "s", "t", "B")
@@ -50,25 +50,7 @@ _ALIASES = {"°": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um"}
 
 LARGEST = 1e100  # magnitude allowed in a study, so that conversion to internal units does not overflow
 # Allowed inputs by internal unit, as messages write them.
-_EXAMPLES = {
-    "mm": "a length, in mm, um, cm, m or inch",
-    "rad": "an angle, in deg, rad, mrad or rev",
-    "t": "a mass, in kg, g, t or lb",
-    "t/mm": "a mass per length, in g/mm, kg/m or t/mm",
-    "N": "a force, in N, kN or lbf",
-    "N*mm": "a torque, in N*mm or N*m",
-    "t*mm^2": "an inertia, in kg*mm^2, g*mm^2, kg*m^2 or t*mm^2",
-    "MPa": "a pressure, in MPa, N/mm^2 or kN/m^2",
-    "N/mm": "a stiffness, in N/mm, N/m or kN/mm",
-    "N*s/mm": "a damping, in N*s/mm or N*s/m",
-    "N*mm*s": "a torque over a speed, in N*m/rpm, N*m*s or N*mm*s",
-    "mm/s^2": "an acceleration, in m/s^2 or mm/s^2",
-    "rad/s^2": "an angular acceleration, in rad/s^2",
-    "rad/s": "a speed of rotation, in rpm, rad/s or deg/s",
-    "s": "a time, in s, ms, min or h",
-    "B": "a size, in B, MB or GB",
-    "1": 'a pure number, as 0.5 or "50 %"',
-}
+_EXAMPLES = dict(QUANTITIES.values()) | {"B": "a size, in B, MB or GB", "1": 'a pure number, as 0.5 or "50 %"'}
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
 _TERM = re.compile(r"([A-Za-z%°\u00b5\u03bc]+|1)(?:\^(-?[1-9]))?")

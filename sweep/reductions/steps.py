@@ -18,7 +18,7 @@ from sweep.families.machines.machine import Machine
 from sweep.families.reduction import REDUCTIONS, reduction_of
 from sweep.families.rssr import proven_columns
 from sweep.quantities.dimensions import dimension_step, size_step
-from sweep.quantities.kinds import GeneralRoute, Reduced, Request, WindowAngle, requests
+from sweep.quantities.kinds import GeneralRoute, Reduced, Request, WindowAngle, is_windowed, requests
 from sweep.quantities.resolve import resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import curve_of
@@ -188,7 +188,7 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
         found = resolve(family, name)  # unknown names end here
         if not isinstance(found, Reduced) or not found.extreme:
             continue
-        cut = windowed and is_windowed(family, name)
+        cut = windowed and is_windowed(family, found)
         if cut or applying_step(family, name, accuracy) is None:
             why = f"{name} in a window" if cut else name
             raise InputError(
@@ -196,11 +196,6 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
             )
     if not set(names) & set(wanted):
         raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
-
-
-def is_windowed(family: Family, name: str) -> bool:
-    """Whether an output uses only poses in the window, if a window is given."""
-    return any(request.windowed for request in requests(family, resolve(family, name), True))
 
 
 # Poses per design on average: for a margin, a mean, an event, a search without its peaks, a refined extremum.

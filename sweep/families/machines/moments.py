@@ -19,8 +19,8 @@ from sweep.families.base import PER_RADIAN, Columns, Output, Parameter
 from sweep.families.machines import crossings
 from sweep.families.machines.segments import Gap, cross, dot, minus
 from sweep.families.machines.thread_way import turned as turned_back
-from sweep.families.machines.tools import Blade, Needle, rate_of
-from sweep.families.sites import AXES
+from sweep.families.machines.tools import Blade, Needle
+from sweep.families.sites import components, rate_of, vector_of
 from sweep.numerics.records import Indices, only
 
 if TYPE_CHECKING:
@@ -163,11 +163,11 @@ class Taking(crossings.Moment):
             names += [rate_of(self.needle.on), rate_of(self.blade.tip)]
         if self.gap.name in wanted:
             names.append(self.blade.back)
-        return frozenset(f"{name}_{axis}" for name in names for axis in AXES)
+        return frozenset(components(*names))
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Compute the wanted outputs, (n, m); nan where the scarf is along the needle."""
-        point, tip, line = (_vector(found, name) for name in (self.needle.on, self.blade.tip, self.needle.line))
+        point, tip, line = (vector_of(name, found) for name in (self.needle.on, self.blade.tip, self.needle.line))
         n = [self.needle.sense * x for x in line]
         scarf = self.needle.scarf
         along = dot(scarf, n)
@@ -179,7 +179,7 @@ class Taking(crossings.Moment):
         columns = self.gap.compute(found, frozenset()) if self.gap.name in wanted else {}
         orders = [("", point, tip)]
         if not wanted.isdisjoint(self._moving):
-            orders.append(("d", _vector(found, rate_of(self.needle.on)), _vector(found, rate_of(self.blade.tip))))
+            orders.append(("d", vector_of(rate_of(self.needle.on), found), vector_of(rate_of(self.blade.tip), found)))
         for d, point, tip in orders:
             r = minus(tip, point)
             parts = {"across": dot(r, u), "side": dot(r, w), "height": dot(r, n), "depth": dot(point, n)}
@@ -291,10 +291,6 @@ class Taking(crossings.Moment):
         fast = np.fmax(np.real(speed["at"]), np.real(speed["after"]))
         columns["steep"] = crossings.steepness(fast, turned["at"], turned["after"])
         return columns | {f"{name}_{key}": value for key, value in values.items()}
-
-
-def _vector(found: Mapping[str, Any], name: str) -> list[Any]:
-    return [found[f"{name}_{axis}"] for axis in AXES]
 
 
 def _last(stops: crossings.CrankAngles, depth: Array, size: Array, phi: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 
 from sweep.errors import InputError, choices
 from sweep.families.base import PER_RADIAN, Output, Parameter, Step
-from sweep.families.sites import AXES
+from sweep.families.sites import AXES, components, rate_of, vector_of
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
@@ -109,12 +109,12 @@ class Distance(Relation):
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Names of the coordinates of both points."""
-        return frozenset(f"{point}_{axis}" for point in self.points for axis in AXES)
+        return frozenset(components(*self.points))
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Compute the distance and its components, (n, m)."""
         a, b = self.points
-        parts = [found[f"{b}_{axis}"] - found[f"{a}_{axis}"] for axis in AXES]
+        parts = [end - start for start, end in zip(vector_of(a, found), vector_of(b, found), strict=True)]
         return with_size(self.name, parts, wanted)
 
 
@@ -135,19 +135,14 @@ class PointSpeed(Relation):
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Names of the velocities of the points."""
-        return frozenset(velocity for point in self.points for velocity in _velocities(point))
+        return frozenset(components(*map(rate_of, self.points)))
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Compute the speed, (n, m)."""
-        parts = [found[name] for name in _velocities(self.points[-1])]
-        if len(self.points) == 2:
-            parts = [part - found[name] for part, name in zip(parts, _velocities(self.points[0]), strict=True)]
+        *first, parts = (vector_of(rate_of(point), found) for point in self.points)
+        for other in first:
+            parts = [part - rate for part, rate in zip(parts, other, strict=True)]
         return {self.name: np.sqrt(parts[0] ** 2 + parts[1] ** 2 + parts[2] ** 2)}
-
-
-def _velocities(point: str) -> tuple[str, ...]:
-    member, _, own = point.partition(".")
-    return tuple(f"{member}.d{own}_{axis}" for axis in AXES)
 
 
 def with_size(name: str, parts: list[Any], wanted: frozenset[str]) -> dict[str, Any]:

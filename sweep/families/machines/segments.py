@@ -14,7 +14,7 @@ import numpy as np
 
 from sweep.families.base import Output
 from sweep.families.machines.relations import Relation
-from sweep.families.sites import AXES
+from sweep.families.sites import Spot
 
 Point: TypeAlias = Sequence[Any]
 
@@ -94,29 +94,16 @@ def _foot(v: Point, d: Point) -> Any:
 
 @dataclass(frozen=True)
 class Capsule:
-    """A segment with a radius.
-
-    ``ends`` are dotted names of two points, or of a point and a direction along which both ends lie at distances
-    ``reach``.
-    """
+    """The segment between two points, with a radius."""
 
     name: str
-    ends: tuple[str, str]
-    reach: tuple[float, float] | None = None
+    ends: tuple[Spot, Spot]
     radius: float = 0.0
 
     @property
-    def needs(self) -> frozenset[str]:
+    def needs(self) -> set[str]:
         """Names of the coordinates of its ends."""
-        return frozenset(f"{end}_{axis}" for end in self.ends for axis in AXES)
-
-    def segment(self, found: Mapping[str, Any]) -> tuple[list[Any], list[Any]]:
-        """Both ends, coordinates (n, m)."""
-        start, end = ([found[f"{name}_{axis}"] for axis in AXES] for name in self.ends)
-        if self.reach is None:
-            return start, end
-        first, last = ([x + far * along for x, along in zip(start, end, strict=True)] for far in self.reach)
-        return first, last
+        return self.ends[0].needs(False) | self.ends[1].needs(False)
 
 
 @dataclass(frozen=True)
@@ -144,11 +131,11 @@ class Gap(Relation):
 
     def needs(self, wanted: frozenset[str]) -> frozenset[str]:
         """Names of the coordinates of both bodies' ends."""
-        return self.bodies[0].needs | self.bodies[1].needs
+        return frozenset(self.bodies[0].needs | self.bodies[1].needs)
 
     def compute(self, found: Mapping[str, Any], wanted: frozenset[str]) -> dict[str, Any]:
         """Compute the gap, its places along the bodies, and the side, (n, m)."""
-        (p1, q1), (p2, q2) = (body.segment(found) for body in self.bodies)
+        (p1, q1), (p2, q2) = ([end.position(found) for end in body.ends] for body in self.bodies)
         nearest = closest(p1, q1, p2, q2)
         columns = {self.name: nearest.distance - sum(body.radius for body in self.bodies)}
         columns |= {f"{self.name}_first": nearest.first, f"{self.name}_second": nearest.second}

@@ -17,9 +17,10 @@ from sweep.families.machines.relations import known_names, two_names
 from sweep.families.machines.sewing import Sewing
 from sweep.families.machines.thread_balance import ThreadBalance
 from sweep.families.machines.thread_way import Edge, TakeUp, Waypoint, spots
-from sweep.families.machines.tools import Blade, Needle, Seam, Spot, Tool, length
+from sweep.families.machines.tools import Blade, Needle, Seam, Tool, length
 from sweep.families.machines.triangles import Entering
 from sweep.families.parts import Member, vector
+from sweep.families.sites import Spot
 from sweep.numerics.curves import TableCurve, table_curve
 
 ROUNDED = 1e-9  # rad: 30 deg to 390 deg, each rounded, is a whole turn

@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels.types import TWO_PI
 from sweep.families.machines.segments import Point, dot, minus
-from sweep.families.machines.tools import Spot
+from sweep.families.sites import Spot
 
 PHI = "phi"
 

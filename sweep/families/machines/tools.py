@@ -13,50 +13,13 @@ from sweep.families.capabilities import OutputLink
 from sweep.families.machines.relations import Relation, two_names
 from sweep.families.machines.segments import Capsule, Gap, dot, minus
 from sweep.families.parts import Member, vector
-from sweep.families.sites import AXES, links_of
+from sweep.families.sites import Spot, links_of
 
 NEEDLE_KEYS = ("on", "line", "sense", "scarf", "diameter", "floor", "top", "scarf_end", "eye", "point")
 BLADE_KEYS = ("on", "tip", "back", "eye", "hold", "radius")
 SEAM_KEYS = ("at",)
 PLATE_KEYS = ("at", "normal", "fabric")
 PLACES = ("tip", "back", "eye", "hold")  # of a blade, as a member's tip
-
-
-@dataclass(frozen=True)
-class Spot:
-    """A point of a tool: one of a member, or one at the distance ``far`` along a line from it, or a fixed point ``at``.
-
-    ``on`` and ``line`` are dotted names of the point and of the direction, "" for none.
-    """
-
-    on: str = ""
-    line: str = ""
-    far: float = 0.0
-    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def needs(self, moving: bool) -> set[str]:
-        """Return the names of the coordinates of point and line, with velocities if ``moving``."""
-        names = [name for name in (self.on, self.line, rate_of(self.on) if moving else "") if name]
-        return {f"{name}_{axis}" for name in names for axis in AXES}
-
-    def position(self, found: Mapping[str, Any]) -> list[Any]:
-        """Return the coordinates of the point, each (n, m) or a number."""
-        if not self.on:
-            return list(self.at)
-        start = [found[f"{self.on}_{axis}"] for axis in AXES]
-        if not self.line:
-            return start
-        return [x + self.far * found[f"{self.line}_{axis}"] for x, axis in zip(start, AXES, strict=True)]
-
-    def velocity(self, found: Mapping[str, Any]) -> list[Any]:
-        """Return the derivative of the coordinates by the main shaft's angle, (n, m): a needle keeps its direction."""
-        return [found[f"{rate_of(self.on)}_{axis}"] for axis in AXES] if self.on else [0.0, 0.0, 0.0]
-
-
-def rate_of(name: str) -> str:
-    """Return the dotted name of the velocity of a point; "" for a name without a dot."""
-    member, dot, own = name.partition(".")
-    return f"{member}.d{own}" if dot else ""
 
 
 @dataclass(frozen=True)
@@ -90,8 +53,7 @@ class Needle:
     @property
     def body(self) -> Capsule:
         """Capsule of the needle from its top to its point."""
-        reach = (self.sense * self.top, self.sense * self.point)
-        return Capsule(self.name, (self.on, self.line), reach, 0.5 * self.diameter)
+        return Capsule(self.name, (Spot(self.on, self.line, self.sense * self.top), self.working), self.radius)
 
     @property
     def working(self) -> Spot:
@@ -121,7 +83,7 @@ class Blade:
     @property
     def body(self) -> Capsule:
         """Capsule of the blade from its tip to its back end."""
-        return Capsule(self.name, (self.tip, self.back), None, self.radius)
+        return Capsule(self.name, (self.working, Spot(self.back)), self.radius)
 
     @property
     def working(self) -> Spot:
@@ -302,7 +264,8 @@ def bodies(members: Mapping[str, Member], tools: Mapping[str, Tool]) -> dict[str
     found = {name: tool.body for name, tool in tools.items() if isinstance(tool, Needle | Blade)}
     for m in members.values():
         for link, (first, second) in links_of(m).items():
-            found[f"{m.name}.{link}"] = Capsule(f"{m.name}.{link}", (f"{m.name}.{first}", f"{m.name}.{second}"))
+            ends = Spot(f"{m.name}.{first}"), Spot(f"{m.name}.{second}")
+            found[f"{m.name}.{link}"] = Capsule(f"{m.name}.{link}", ends)
     return found
 
 

@@ -17,7 +17,7 @@ from kernels.types import TWO_PI
 from sweep.families.base import PER_RADIAN, Columns, Output
 from sweep.families.machines import crossings
 from sweep.families.machines.segments import cross, dot, minus
-from sweep.families.machines.tools import Spot
+from sweep.families.sites import Spot
 
 if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
