@@ -251,3 +251,47 @@ def test_slider_on_an_elastic_rod_answers_an_eccentric_as_textbooks_say(ratio: f
     expected = ratio**2 / np.hypot(1.0 - ratio**2, 2.0 * damping * ratio)
     assert found["max_abs_lag_dynamic"] == pytest.approx(expected, rel=1e-6)
     assert found["floquet"] == pytest.approx(np.exp(-2.0 * np.pi * damping / ratio), rel=1e-12)
+
+
+def test_steam_engine_of_khurmi_and_gupta_has_the_printed_forces_and_torque() -> None:
+    """Theory of Machines, chapter 15: crank 0.3 m, rod 1.2 m, 250 kg, 250 rev/min, 68.73 kN of steam at 60 deg.
+
+    The series of two terms makes the piston effort 49.424 kN; it is 49.440.  Quoted without the book at hand.
+    """
+    speed, steam = 250.0 * np.pi / 30.0, 350.0 * np.pi / 4.0 * 0.5**2
+    design = {"a": 0.3, "b": 1.2, "m_crank": 0.0, "m_coupler": 0.0, "m_slider": 0.25, "speed": speed}
+    want = "drive_torque, force_c, force_d_y"
+    found = sweep.evaluate("slider_crank", design | {"load_force": -steam}, want, phi="60 deg").iloc[0]
+    own = 49.424 / 49.440  # the forces of rods without mass go as the effort
+    assert -found["drive_torque"] * own == pytest.approx(14.484, abs=5e-3)
+    assert found["force_c"] * own == pytest.approx(50.62, abs=0.005)
+    assert found["force_d_y"] * own == pytest.approx(10.96, abs=0.005)
+
+
+def test_engine_of_khurmi_and_gupta_is_left_with_the_printed_force() -> None:
+    """Theory of Machines, example 22.1: two thirds of 50 kg and all of 37 kg at 150 mm balanced by 26.38 kg at 400 mm.
+
+    At 240 rev/min and 60 deg 2.849 kN of primary force are left, with a rounded speed: a rod of 10^6 cranks.  Quoted
+    without the book at hand.
+    """
+    speed, balance = 8.0 * np.pi, 26.375e-3
+    crank = 0.037 + balance
+    design = {"a": 0.15, "b": 1.5e5, "m_crank": crank, "com_crank_x": (0.037 * 0.15 - balance * 0.4) / crank}
+    design |= {"m_coupler": 0.0, "m_slider": 0.05, "speed": speed}
+    found = sweep.evaluate("slider_crank", design, "shaking_force", phi="60 deg")["shaking_force"][0]
+    assert found == pytest.approx(0.05 * 0.15 * speed**2 * np.hypot(0.5 / 3.0, np.sqrt(3.0) / 3.0), rel=1e-5)
+    assert found == pytest.approx(2.849, rel=1e-3)
+
+
+def test_four_bar_balanced_by_berkof_and_lowen_shakes_nothing() -> None:
+    """Their two counterweights: m2 r2 = m3 (a/b)(r3 - b), m4 r4 = -m3 (c/b) r3 for a coupler of any shape (1969)."""
+    a, b, c, mass, centre = 50.0, 150.0, 100.0, 3e-4, 60.0 + 20.0j
+    design = {"a": a, "b": b, "c": c, "e": 160.0, "branch": -1, "speed": 30.0, "m_coupler": mass}
+    design |= {"m_crank": 4e-4, "m_rocker": 5e-4}
+    moments = {"crank": mass * a / b * (centre - b), "rocker": -mass * c / b * centre, "coupler": mass * centre}
+    for link, moment in moments.items():
+        offset = moment / design[f"m_{link}"]
+        design |= {f"com_{link}_x": offset.real, f"com_{link}_y": offset.imag, f"j_{link}_zz": 1.0}
+    found = sweep.evaluate("four_bar", design, "shaking_force, force_b", phi=np.linspace(0.0, 6.0, 13))
+    # Rounding of the forces that cancel.
+    assert found["shaking_force"].max() < 1e-14 * found["force_b"].max()

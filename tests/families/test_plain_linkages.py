@@ -168,6 +168,41 @@ def test_inverted_slider_crank_with_a_long_crank_turns_fully():
     assert (row.max_dpsi, row.min_dpsi) == pytest.approx((2.0, 2.0 / 3.0), rel=1e-9)
 
 
+def test_geneva_drive_of_beer_and_johnston_has_the_printed_motion():
+    # Vector Mechanics, sample problems 15.9 and 15.10: pin at 50 mm, pivots 50 sqrt(2) mm apart, 10 rad/s, the pin at
+    # 30 deg from the line of pivots: 4.08 rad/s, 233 rad/s^2, 477 mm/s in the slot.  Quoted without the book at hand.
+    design = {"a": 50.0, "e": 50.0 * math.sqrt(2.0)}
+    found = sweep.evaluate("inverted_slider_crank", design, "psi, s, dpsi, ds, d2psi", phi="30 deg").iloc[0]
+    assert found["s"] == pytest.approx(37.1, abs=0.05)
+    assert 180.0 - math.degrees(found["psi"]) == pytest.approx(42.4, abs=0.05)
+    assert 10.0 * found["ds"] == pytest.approx(477.0, abs=0.5)
+    assert 10.0 * found["dpsi"] == pytest.approx(-4.08, abs=0.005)
+    assert 100.0 * found["d2psi"] == pytest.approx(233.0, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("slots", "speed", "entry", "peak", "place"),
+    [
+        (4, 2.41, 1.0, 5.41, 11.46),
+        (5, 1.43, 0.7265, 2.30, 17.57),
+        (6, 1.0, 0.5774, 1.35, 22.90),
+        (8, 0.62, 0.4142, 0.70, 31.64),
+    ],
+)
+def test_geneva_wheel_has_the_tabulated_speed_and_accelerations(slots, speed, entry, peak, place):
+    # Tables of handbooks, quoted without a book at hand: largest speed, acceleration on entry, largest acceleration and
+    # its place, with a driver at 1 rad/s.
+    design = {"a": math.sin(math.pi / slots), "e": 1.0}
+    want = "max_abs_dpsi, max_abs_d2psi, phi_max_abs_d2psi"
+    found = sweep.summarise("inverted_slider_crank", design, want, accuracy=1e-10).iloc[0]
+    assert found["max_abs_dpsi"] == pytest.approx(speed, abs=0.005)
+    assert found["max_abs_d2psi"] == pytest.approx(peak, abs=0.005)
+    assert math.degrees(found["phi_max_abs_d2psi"]) == pytest.approx(place, abs=0.005)
+    entering = sweep.evaluate("inverted_slider_crank", design, "dpsi, d2psi", phi=math.pi / 2.0 - math.pi / slots)
+    assert entering["dpsi"][0] == pytest.approx(0.0, abs=1e-15)
+    assert entering["d2psi"][0] == pytest.approx(entry, abs=5e-5)
+
+
 @pytest.mark.parametrize(
     ("change", "status"),
     [

@@ -1,4 +1,5 @@
-"""Theorems of the literature that hold exactly: Roberts' cognates, Bennett's linkage, Hooke's joints, the wobble drive.
+"""Theorems of the literature that hold exactly: Roberts' cognates, Bennett's linkage, Hooke's joints, the wobble drive,
+Watt's curve, Freudenstein's collineation axis.
 
 The theorems are closed forms that share no equation with the kernels; tolerances are roundings of float64.
 """
@@ -81,3 +82,32 @@ def test_wobble_drive_swings_as_its_closed_form() -> None:
     # It is largest at the dead centres.
     assert turn["max_abs_d2psi"] == pytest.approx(np.sin(2.0 * slope) / 2.0, rel=1e-14)
     assert turn["margin"] == pytest.approx(np.cos(slope) ** 2 / 2.0, rel=1e-14)
+
+
+def test_middle_of_the_coupler_of_watt_draws_his_curve() -> None:
+    """Pivots 2 k apart, arms b, coupler 2 c: r^2 = b^2 - (k sin t +- sqrt(c^2 - k^2 cos^2 t))^2 about their middle."""
+    b, k, c = 3.0, 3.2, 1.1
+    design = {"a": b, "b": 2.0 * c, "c": b, "e": 2.0 * k, "xi": c, "eta": 0.0, "branch": [1.0, -1.0]}
+    found = sweep.evaluate("four_bar", design, "x_m, y_m", phi=np.linspace(-0.6, 0.6, 13))
+    assert (found["status"] == 0).all()
+    x, y = found["x_m"].to_numpy() - k, found["y_m"].to_numpy()
+    sine, cosine = y / np.hypot(x, y), x / np.hypot(x, y)
+    root = np.sqrt(c**2 - (k * cosine) ** 2)
+    misses = [x**2 + y**2 - b**2 + (k * sine + sign * root) ** 2 for sign in (1.0, -1.0)]
+    # The root vanishes where a line through the middle touches the curve: some hundred roundings of 10.
+    np.testing.assert_allclose(np.min(np.abs(misses), axis=0), 0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("extreme", ["max_dpsi", "min_dpsi"])
+def test_collineation_axis_is_square_to_the_coupler_where_the_rocker_is_fastest(extreme: str) -> None:
+    """Freudenstein 1956: the axis joins the pole of coupler and frame to that of crank and rocker."""
+    design = {"a": 1.0, "b": 3.5, "c": 2.7, "e": 3.0, "branch": -1.0}
+    phi = sweep.summarise("four_bar", design, f"phi_{extreme}", accuracy=1e-12)[f"phi_{extreme}"]
+    pose = sweep.evaluate("four_bar", design, "x_b, y_b, x_c, y_c", phi=phi.to_numpy()).iloc[0]
+    crank, rocker_pin = np.array([pose["x_b"], pose["y_b"]]), np.array([pose["x_c"], pose["y_c"]])
+    rocker, coupler = rocker_pin - [3.0, 0.0], rocker_pin - crank
+    # D + t rocker = u crank, and B + v coupler on the frame line.
+    pole = np.linalg.solve(np.column_stack([crank, -rocker]), [3.0, 0.0])[0] * crank
+    axis = pole - (crank - crank[1] / coupler[1] * coupler)
+    # The place is flat to the root of the accuracy of the value; it comes from a root of the derivative.
+    assert axis @ coupler / np.linalg.norm(axis) / np.linalg.norm(coupler) == pytest.approx(0.0, abs=1e-11)
