@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sweep.dataset import chunk_files, files
 from sweep.dataset.files import check_tables
+from sweep.dataset.store import differences
 from sweep.errors import InputError, StoreError, how_many
 from sweep.evaluation.statuses import meaning
 from sweep.families.names import is_error
@@ -288,7 +289,8 @@ def _notes(folders: Sequence[Path], plans: Sequence[Mapping[str, Any]]) -> tuple
             0, f"two studies of different mechanisms, {mechanisms[0]} and {mechanisms[1]}: no row is comparable"
         )
     elif plans[0].get("study") != plans[1].get("study"):
-        notes.append("the studies differ in what determines the values")
+        words = differences(*(plan.get("chunk_data") or {} for plan in plans))
+        notes.append(f"the studies differ in what determines the values: {'; '.join(words) or 'fixed tables'}")
     if plans[0].get("code") != plans[1].get("code"):
         notes.append("computed by different versions of the code or its libraries")
     return tuple(notes)

@@ -13,8 +13,6 @@ from sweep.dataset import chunk_files, files, store
 from sweep.dataset.files import TABLES
 from sweep.study import Study
 
-MOST = 6  # differences that are reported at most
-
 # Files that belong to these designs only, their report included.
 OWN_FILES = (files.PLAN, *files.OF_OPTIMUM, files.PARETO, "report.html")
 
@@ -81,7 +79,7 @@ def part_range(folder: Path, chunks: int) -> range:
 def _conflict(study: Study, noted: dict[str, Any], plan: Plan) -> str:
     """Describe how the data in the folder differ from those that this run would compute."""
     before, now = (_in_chunks(data) for data in (noted.get("data") or noted["chunk_data"], study.data))
-    reasons = [] if noted.get("study") == plan.study else differences(before, now)
+    reasons = [] if noted.get("study") == plan.study else store.differences(before, now)
     if noted.get("code") != plan.code:
         reasons.append("other sources or libraries")
     name = noted["name"] if noted["name"] == study.name else f"{noted['name']}, not {study.name}"
@@ -118,49 +116,3 @@ def plan_note(study: Study, folder: Path, plan: Plan) -> dict[str, Any]:
         **({"part": note["part"]} if "part" in note else {}),
         "complete": False,
     }
-
-
-WITHOUT_UNIT = ("count", "scale")  # keys of a parameter that its unit does not belong to
-
-
-def differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> list[str]:
-    """Describe keys whose values differ, such as ``limits.swing.min 170 -> 50 deg``; at most six of them."""
-    lines = list(_lines(old, new, ""))
-    more = [f"and {len(lines) - MOST} more"] if len(lines) > MOST else []
-    return lines[:MOST] + more
-
-
-def _lines(old: Mapping[str, Any], new: Mapping[str, Any], place: str) -> list[str]:
-    lines: list[str] = []
-    units = old.get("unit"), new.get("unit")
-    for key in [*new, *(key for key in old if key not in new)]:
-        before, now = old.get(key), new.get(key)
-        name = f"{place}{key}"
-        if before == now or (key == "unit" and len(old) > 1):
-            continue
-        if isinstance(before, Mapping) and isinstance(now, Mapping):
-            lines += _lines(before, now, f"{name}.")
-        else:
-            if isinstance(before, list) and isinstance(now, list) and len(before) == len(now) > MOST:
-                pairs = [pair for pair in zip(before, now, strict=True) if pair[0] != pair[1]]
-                before, now = [x for x, _ in pairs], [x for _, x in pairs]
-            unit_before, unit = (None, None) if key in WITHOUT_UNIT else units
-            unit_before = unit_before if unit_before != unit else None
-            lines.append(f"{name} {_written(before, unit_before)} -> {_written(now, unit)}")
-    if not lines and units[0] != units[1]:
-        lines.append(f"{place}unit {_written(units[0])} -> {_written(units[1])}")
-    return lines
-
-
-def _written(value: Any, unit: Any = None) -> str:
-    if value is None:
-        return "none"
-    if isinstance(value, Mapping):
-        own, unit = value.get("unit"), None
-        value = ", ".join(
-            f"{key} = {_written(v, None if key in WITHOUT_UNIT else own)}" for key, v in value.items() if key != "unit"
-        )
-    if isinstance(value, list):
-        value = f"{len(value)} values" if len(value) > MOST else ", ".join(map(str, value))
-    text = str(value).lower() if isinstance(value, bool) else f"{value:g}" if isinstance(value, float) else str(value)
-    return f"{text} {unit}" if unit and unit != "1" else text

@@ -14,7 +14,7 @@ import numpy as np
 from sweep.dataset import files
 from sweep.dataset.comparison import LEAST_SECONDS, ROWS_CHANGED, SLOWER, VALUES_CHANGED, compare
 from sweep.dataset.reading import best
-from sweep.engine.opening import differences
+from sweep.dataset.store import differences
 from sweep.nights.archive import NightRecord
 from sweep.study import Study
 

@@ -176,6 +176,11 @@ def test_rows_of_two_studies_that_are_other_designs_are_said(study: Study, datas
     for folder in (same, other):
         files.write_plan(folder, (files.read_plan(folder) or {}) | {"study": "y"})
     assert "designs differ" not in "\n".join(sweep.compare(dataset, same).lines())
+    data = (files.read_plan(other) or {})["chunk_data"]
+    longer = data | {"design": data["design"] | {"b": data["design"]["b"] | {"to": 160}}}
+    files.write_plan(other, (files.read_plan(other) or {}) | {"study": "z", "chunk_data": longer})
+    (said,) = [line for line in sweep.compare(dataset, other).lines() if line.startswith("the studies differ in what")]
+    assert said.endswith(": design.b.to 150 -> 160 mm")
     assert any("the designs differ in a: rows are" in line for line in sweep.compare(dataset, other).lines())
     plan = files.read_plan(other) or {}
     files.write_plan(other, plan | {"data": {"mechanism": {"chain": ["rssr", "guide"]}}})

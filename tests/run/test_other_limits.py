@@ -13,7 +13,7 @@ import sweep.chunks.plan
 from sweep.chunks.chunk import compute_chunk
 from sweep.dataset import chunk_files, files
 from sweep.dataset.files import OLD, PLAN, beside
-from sweep.engine.opening import differences
+from sweep.dataset.store import differences
 from sweep.errors import InputError
 from sweep.study import load_study
 from tests.support.engine_study import SMALL_CHUNKS, chunk_bytes, write_study
