@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 A3 = (16.54, 11.69)  # inches, landscape
-VIEWS_HIGH, TABLES_HIGH = 5.7, 6.0  # inches, of the views and of each row of tables; the sheet grows with the rows
+VIEWS_HIGH, HEAD_HIGH, LINE_HIGH = 5.7, 0.5, 0.22  # inches, of the views, and of title and lines in a row of tables
 LINES = 24  # lines of a table before it continues in the next one
 WIDTHS = ((1.5, 1.1, 1.0), (1.0, 1.0))  # shares of the width for the tables of the first row and of the rows below
 POSES = 180  # poses of the joints' paths
@@ -134,9 +134,10 @@ def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[SheetTable], ta
     frames = frames_of(parts)
     panels = [(frame, view) for frame, same in frames.items() for view in (WORDS if is_spatial(same) else ("xy",))]
     rows = _rows(tables)
+    lines = [max(len(table.lines) for table in row) + 1 for row in rows]  # with the headings
+    heights = [VIEWS_HIGH, *(HEAD_HIGH + LINE_HIGH * count for count in lines)]
     with house_style():
-        figure = new_figure(A3[0], VIEWS_HIGH + TABLES_HIGH * len(rows))
-        heights = [VIEWS_HIGH, *[TABLES_HIGH] * len(rows)]
+        figure = new_figure(A3[0], sum(heights))
         above, *below = np.asarray(figure.subfigures(len(heights), 1, height_ratios=heights)).ravel().tolist()
         for axes, (frame, view) in zip(above.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
             draw(axes, frames[frame], view, "mm", 1)
@@ -145,7 +146,7 @@ def _draw(data: Dataset, parts: Sequence[Part], tables: Sequence[SheetTable], ta
         for k, (place, row) in enumerate(zip(below, rows, strict=True)):
             widths = WIDTHS[min(k, 1)]
             for axes, table in itertools.zip_longest(place.subplots(1, len(widths), width_ratios=widths), row):
-                _set(axes, table)
+                _set(axes, table, lines[k])
         speed = f", {rpm(data.study.speed)}" if data.study.speed is not None else ""
         figure.suptitle(f"{data.study.title or data.study.name}{speed}. Lengths in mm, angles in degrees.")
         separate_names(figure)
@@ -166,8 +167,8 @@ def _rows(tables: Sequence[SheetTable]) -> list[list[SheetTable]]:
     return [first, *(rest[k : k + wide] for k in range(0, len(rest), wide))]
 
 
-def _set(axes: Axes, table: SheetTable | None) -> None:
-    """Draw a table with the line height of all tables."""
+def _set(axes: Axes, table: SheetTable | None, most: int) -> None:
+    """Draw a table with the line height of all tables; ``most`` lines fill the axes."""
     from matplotlib.transforms import Bbox
 
     axes.set_axis_off()
@@ -177,7 +178,7 @@ def _set(axes: Axes, table: SheetTable | None) -> None:
     if not table.lines:
         axes.text(0.0, 1.0, "none", va="top")
         return
-    high, wide = (len(table.lines) + 1) / (LINES + 1), axes.get_window_extent().width / axes.figure.dpi * LETTERS
+    high, wide = (len(table.lines) + 1) / most, axes.get_window_extent().width / axes.figure.dpi * LETTERS
     lines, widths = _fitted(table, wide)
     drawn = axes.table(
         lines, colLabels=list(table.heads), cellLoc="left", colLoc="left", colWidths=widths,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 
 import numpy as np
@@ -12,7 +13,7 @@ from click.testing import CliRunner
 import sweep
 from sweep.cli import main
 from sweep.exchange.scene import pose
-from sweep.plot.sheet import LINES, _rows, tables_of, write_sheet
+from sweep.plot.sheet import A3, LINES, VIEWS_HIGH, _rows, tables_of, write_sheet
 from sweep.report.dataset import as_result, chosen, read_dataset, row_of
 from sweep.study import study_from_data
 
@@ -96,6 +97,13 @@ def test_a_long_table_goes_on_below_in_lines_of_the_same_height(machine, tmp_pat
     assert lines == {t.title: list(t.lines) for t in tables}
     assert below and below[0][0].title == "Dimensions, continued"
     assert write_sheet(machine, None, tmp_path / "three.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_sheet_is_as_long_as_its_tables_need(folder, machine, tmp_path):
+    """Ten lines below the views need less than A3, 66 lines of three cranks in rows of 24 need more."""
+    short, long = (write_sheet(f, None, tmp_path / "sheet.svg").read_text() for f in (folder, machine))
+    heights = [float(re.search(r'height="([\d.]+)pt"', text).group(1)) / 72.0 for text in (short, long)]
+    assert VIEWS_HIGH + 2.0 < heights[0] < 0.8 * A3[1] and heights[1] > A3[1]
 
 
 def test_a_machine_has_its_cyclogram_on_the_sheet(machine):
