@@ -83,7 +83,8 @@ def _comparison(data: Dataset, name: str) -> str:
     value, old = tables.value_of(data.result, name), tables.value_of(data.reference, name)
     text = f"Its {shown.words} is {_with_speed(data, shown, value)}"
     difference = change(shown, value, old)
-    return f"{text}; the reference has {shown.show(old)} ({difference})." if difference else f"{text}."
+    than = "the same as" if difference == "the same" else f"{difference} than"
+    return f"{text}, {than} the {shown.show(old)} of the reference." if difference else f"{text}."
 
 
 def _with_speed(data: Dataset, shown: ShownQuantity, value: float) -> str:

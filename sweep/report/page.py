@@ -272,9 +272,11 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     data = read_dataset(folders[0])
     names = _names([read_dataset(folder).study.name for folder in folders], folders)
     designs = [chosen(folder) for folder in folders]
-    parameters = data.study.bare.parameter_names
+    # Mechanisms of one kind have parameters of the same names and meanings: a slider-crank has the names of rssr.
+    meanings = {parameter.name: parameter.text for parameter in data.study.bare.parameters}
+    parameters = tuple(meanings)
     for folder, entry in zip(folders, designs, strict=True):
-        if not set(parameters) <= set(entry.design):
+        if not meanings.items() <= {p.name: p.text for p in entry.family.parameters}.items():
             allowed = f"a dataset of the mechanism of {folders[0]}: {', '.join(parameters)}"
             raise InputError("folder", str(folder), allowed, "report")
     first = designs[0].design

@@ -62,8 +62,22 @@ def test_another_mechanism_is_refused(folders, tmp_path):
          "design": {"a": {"values": [10.0, 12.0], "unit": "mm"}, "b": "60 mm", "e": "0 mm"},
          "objective": {"minimise": "stroke"}}, "study.toml")  # fmt: skip
     folder = sweep.run(other, out=tmp_path / "slider" / "designs", jobs=1)
-    said = CliRunner().invoke(main, ["report", str(folders[0]), str(folder)])
-    assert said.exit_code == 2 and "of the mechanism of" in said.output
+    spatial = ran(tmp_path, "spatial", mechanism={"family": "rssr"}, scene={"want": ["swing"]}, design={
+        "a": {"values": [10.0, 12.0], "unit": "mm"}, "alpha": "40 deg"}
+        | {name: f"{value} mm" for name, value in {"b": 36, "c": 26, "e": 40, "f": 6, "g": -4}.items()})  # fmt: skip
+    for one, another in ((folders[0], folder), (folder, spatial)):  # a slider-crank has names of rssr: a, b, e, branch
+        said = CliRunner().invoke(main, ["report", str(one), str(another)])
+        assert said.exit_code == 2 and f"{another}'; allowed: a dataset of the mechanism of" in said.output
+
+
+def test_a_design_without_values_is_called_by_its_own_name(folders, tmp_path):
+    """A four-bar of 10, 20, 15 and 32 mm does not close over the turn: 10 + 32 > 20 + 15 (Grashof)."""
+    small = {name: f"{value} mm" for name, value in {"b": 20, "c": 15, "e": 32, "xi": 20, "eta": 5}.items()}
+    reached = {"scene": {"want": ["size"]}, "objective": {"minimise": "size"}, "limits": {}}
+    folder = ran(tmp_path, "stuck", **reached, design={"a": {"values": [10.0, 12.0], "unit": "mm"}} | small)
+    assert CliRunner().invoke(main, ["report", str(folders[0]), str(folder)]).exit_code == 0
+    missed = re.findall('<p class="missed">(.*)</p>', (folders[0].parent / "comparison.html").read_text())
+    assert len(missed) == 1 and missed[0].startswith("stuck: ")
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -83,7 +83,7 @@ def test_answer_states_optimum_against_reference(full: Path) -> None:
     words = text_of(full.parent / "report.html")
     # 8 mm/rad^2 at 7000 rpm: 8e-3 m (2 pi 7000/60)^2 = 4299 m/s^2; 8 is 20 % less than 10
     assert "8 mm/rad² (4299 m/s² at 7000 rpm), 20 % less than the reference design with 10 mm/rad² (5373 m/s²" in words
-    assert "0.05 mm; the reference has 0.1 mm (50 % less)" in words
+    assert "0.05 mm, 50 % less than the 0.1 mm of the reference." in words
     assert "Held back by the active limit: largest deviation from the line in the window (at most 0.05 mm)" in words
     assert "largest pressure angle of stage 1 (40°, at most 45°)" in words
     assert (
