@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ import click
 import numpy as np
 import pandas as pd
 from pyarrow import csv
+from pyarrow.types import is_binary
 
 from sweep.cli.families import complete_families, complete_outputs, family_names
 from sweep.cli.options import A_FILE, ANGLES, IS_FILE
@@ -87,7 +90,9 @@ def evaluate_table(
             "--poses", poses, f"either --poses or a column {variable} in {table}, not both", "command line"
         )
     wants = wanted(want)
-    write_table(evaluate(mechanism, designs, wants, phi, keep=chosen, status_text=status_text, angles=angles), out)
+    with _naming(table):
+        result = evaluate(mechanism, designs, wants, phi, keep=chosen, status_text=status_text, angles=angles)
+    write_table(result, out)
 
 
 @click.command("summarise")
@@ -116,8 +121,22 @@ def summarise_table(
     status that says why.
     """
     out = checked_format(out, table)
-    # The other options are those of `sweep.summarise`.
-    write_table(summarise(family_names(family), read_table(table), wanted(want), keep=kept(keep), **options), out)
+    designs = read_table(table)
+    with _naming(table):  # the other options are those of `sweep.summarise`
+        result = summarise(family_names(family), designs, wanted(want), keep=kept(keep), **options)
+    write_table(result, out)
+
+
+@contextmanager
+def _naming(table: Path) -> Iterator[None]:
+    """Put the name of the file in front of what is said of its columns and rows."""
+    try:
+        yield
+    except InputError as error:
+        if error.place.startswith(("table", "column")):
+            rows = " (its first row is 0)" if ", row " in error.place else ""
+            error.args = (f"{table}{rows}: {error}",)
+        raise
 
 
 def refuse_degrees(domain: Domain, phi: float) -> None:
@@ -165,6 +184,9 @@ def read_table(path: Path) -> pd.DataFrame:
             raise InputError("table", path.name, "values between commas, with decimal points", str(path))
         # The parser of pandas up to version 2 was off by an ulp for some numbers by default.
         table = csv.read_csv(path)
+        foreign = [field.name for field in table.schema if is_binary(field.type)]
+        if foreign:
+            raise InputError("column", foreign[0], "text in UTF-8", str(path))
         frame: pd.DataFrame = table.rename_columns([name.strip() for name in table.column_names]).to_pandas()
         return frame
     except InputError:

@@ -127,12 +127,17 @@ def test_summarise_passes_accuracy_and_window(tmp_path: Path) -> None:
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/x.xlsx"), "ending in .parquet or .csv"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/none/x.csv"), "a file in a folder that exists"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/../{name}/good.csv"), "this one is TABLE"),
-        (("geared_dwell", "{tmp}/bad.csv", "--want", "psi"), "column k, row 1: k = 'x'; allowed: a number"),
+        (
+            ("geared_dwell", "{tmp}/bad.csv", "--want", "psi"),
+            ".csv (its first row is 0): column k, row 1: k = 'x'; a",
+        ),
         (("geared_dwell", "{tmp}/nan.csv", "--want", "psi"), "column k, row 1: k = nan; allowed: a finite number"),
         (("geared_dwell", "{tmp}/nophi.csv", "--want", "psi"), "phi is missing; needed: a column phi [rad], or --p"),
         (("geared_dwell", "{tmp}/empty.csv", "--want", "psi"), "readable csv"),
         (("geared_dwell", "{tmp}/fake.parquet", "--want", "psi"), "readable parquet"),
         (("geared_dwell", "{tmp}/german.csv", "--want", "psi"), "values between commas, with decimal points"),
+        (("geared_dwell", "{tmp}/latin.csv", "--want", "psi"), "latin.csv: column = 'note'; allowed: text in UTF-8"),
+        (("geared_dwell", "{table}", "--want", "psi", "--keep", "no"), "good.csv: table: keep = 'no'; allowed: colu"),
         (("geared_dwell", "{tmp}/table.txt", "--want", "psi"), "ending in .parquet or .csv"),
     ],
 )
@@ -142,6 +147,7 @@ def test_bad_input_is_one_message_and_exit_code_2(tmp_path: Path, arguments: tup
     (tmp_path / "nan.csv").write_text("k,a,phi\n1.2,1,0\n,1,0\n")
     (tmp_path / "nophi.csv").write_text("k,a\n1.2,1\n")
     (tmp_path / "german.csv").write_text("k;a;phi\n1,2;1,0;0,5\n")
+    (tmp_path / "latin.csv").write_text("k,a,phi,note\n1.2,1,0,größer\n", encoding="latin-1")
     for name in ("empty.csv", "fake.parquet", "table.txt"):
         (tmp_path / name).write_text("" if name == "empty.csv" else "no table")
     before = sorted(tmp_path.rglob("*"))
