@@ -239,7 +239,8 @@ def advise(scene: Scene) -> Advice | None:
     work = np.fft.irfft(harmonics, n=excess.shape[1], axis=1)
     mean = inertia.mean(axis=1)
     swing = work - 0.5 * (inertia - mean[:, None]) * (speed * speed)[:, None]
-    estimate = (swing.max(axis=1) - swing.min(axis=1)) / (mean * speed * speed)
+    with np.errstate(divide="ignore", invalid="ignore"):  # links without a mass have no estimate
+        estimate = (swing.max(axis=1) - swing.min(axis=1)) / (mean * speed * speed)
     return Advice.of_turning("estimated unevenness of the crank speed", estimate, 0.01)
 
 

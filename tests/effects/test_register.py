@@ -101,6 +101,17 @@ def test_a_rule_says_whether_an_effect_matters_here(stiffness, wanted, verdict):
     assert any(line.startswith(verdict) for line in words), words
 
 
+def test_links_without_a_mass_get_no_advice_about_their_speed():
+    """Their unevenness would be 0/0: no line, and no warning of numpy (which fails a test)."""
+    bare = family("heddle")
+    full = extended(bare, ["max_abs_drive_torque"])
+    matrix = designs(full, 4)
+    for name in [p.name for p in full.parameters if p.name not in bare.parameter_names and p.name != "speed"]:
+        matrix[:, full.parameter_names.index(name)] = 0.0
+    words = [finding.words for finding in findings(bare, full, matrix, ["max_abs_drive_torque"])]
+    assert words and not any("unevenness" in line for line in words)
+
+
 def test_a_large_axial_force_is_said_where_nobody_asks_for_it():
     bare = family("rssr")
     full = extended(bare, ["psi"])
