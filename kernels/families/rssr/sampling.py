@@ -269,7 +269,7 @@ def sample_block_both(count: int, at: Array, table: CosSin, of_p: Array, of_q: A
 
 @inline
 def mark_peaks(count: int, size: Array, share: float) -> None:
-    """Mark the samples of :func:`sample_block` that are local maxima of ``share`` of the highest, by powers of two."""
+    """Mark the local maxima among samples that reach ``share`` of the highest, as a sum of powers of two."""
     before, begin, end, after = _row(size, 0), _row(size, 1), _row(size, FEWEST), _row(size, FEWEST + 1)
     for k in range(count):
         before[k], after[k] = end[k], begin[k]
@@ -334,7 +334,7 @@ def _marks(begin: int, width: int, floor: float, size: Array) -> int:
 
 @inline
 def list_peaks(at: Array, k: int, table: CosSin, n: int, share: float, size: Array, m: Array, count: int) -> int:
-    """Append the local maxima of ``share`` of the highest among samples by :func:`sample`; none if too many."""
+    """Append the local maxima among samples by :func:`sample` that reach ``share`` of the highest; none if too many."""
     most = 0.0
     for i in range(n):
         most = largest(most, size[i])
