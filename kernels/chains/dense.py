@@ -9,6 +9,7 @@ from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.chains.chain import Chained
 from kernels.chains.form import Helper
 from kernels.jit import generated, generated_inline
+from kernels.linkage.outputs import write_number
 from kernels.types import Array
 
 Least: TypeAlias = tuple[float, ...]
@@ -43,18 +44,12 @@ def dense_maxima(chain: Chained) -> Helper:
             doubt = doubts(c)
             for s in range(stages):
                 least[i, s] = low[s] - doubt[s]
-            if x1 is not None:
-                x1[i] = a1
-            if x2 is not None:
-                x2[i] = a2
-            if x3 is not None:
-                x3[i] = a3
-            if y0 is not None:
-                y0[i] = b0
-            if y1 is not None:
-                y1[i] = b1
-            if y2 is not None:
-                y2[i] = b2
+            write_number(x1, i, a1)
+            write_number(x2, i, a2)
+            write_number(x3, i, a3)
+            write_number(y0, i, b0)
+            write_number(y1, i, b1)
+            write_number(y2, i, b2)
 
     return generated(name, dense)
 

@@ -8,6 +8,7 @@ series follow the extremes and the mean square over a turn.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from kernels.curves.root_search import bisected, false_position
 from kernels.jit import inline, kernel, part
-from kernels.types import EPS, Array, Numbers
+from kernels.types import EPS, TWO_PI, Array, Numbers
 
 NOTHING = 1e-14  # error of the coefficients by the drift of the rotations, as a share of the largest coefficient
 
@@ -185,13 +186,8 @@ def turn_extremes(
 
 
 @inline
-def _slope(phi: float, c: Array, s: Array) -> float:
-    return series(c, s, phi)[1]
-
-
-@inline
-def _rises(phi: float, c: Array, s: Array, sign: float) -> bool:
-    return sign * _slope(phi, c, s) > 0.0
+def _series_at(phi: float, c: Array, s: Array) -> tuple[float, float]:
+    return series(c, s, phi)
 
 
 @inline
@@ -204,22 +200,56 @@ def height_bound(before: float, here: float, after: float) -> float:
     return here + 0.25 * ((after - before) * (after - before) / fall + fall) if fall > 0.0 else here
 
 
+@inline
+def _slope_at(phi: float, sign: float, curve: Callable[..., tuple[float, float]], data: Any) -> float:
+    return sign * curve(phi, *data)[1]
+
+
+@inline
+def _rises(phi: float, sign: float, curve: Callable[..., tuple[float, float]], data: Any) -> bool:
+    return sign * curve(phi, *data)[1] > 0.0
+
+
 @part
-def _top(c: Array, s: Array, sign: float, look: Array, j: int, least: float) -> tuple[float, float]:
-    """Find crank angle and height of the top at sample j; -inf if there is none above ``least``."""
-    n = look.size
-    before, here, after = sign * look[j - 1], sign * look[j], sign * look[(j + 1) % n]
+def top_at(
+    curve: Callable[..., tuple[float, float]], sign: float, samples: Array, j: int, least: float, data: Any
+) -> tuple[float, float]:
+    """Find crank angle and height of the top at sample j of a turn; -inf if there is none above ``least``.
+
+    The samples are those of sign times the curve, of which ``curve(phi, *data)`` gives value and slope.
+    """
+    n = samples.size
+    before, here, after = samples[j - 1], samples[j], samples[(j + 1) % n]
     angle, height = 0.0, -math.inf
     if here >= before and here >= after and height_bound(before, here, after) > least:
-        step = 2.0 * math.pi / n
+        step = TWO_PI / n
         low, high = step * (j - 1), step * (j + 1)
-        at_low, at_high = _slope(low, c, s), _slope(high, c, s)
-        if sign * at_low > 0.0 and sign * at_high < 0.0:
-            angle = false_position(_slope, low, high, at_low, at_high, c, s)
+        at_low, at_high = _slope_at(low, sign, curve, data), _slope_at(high, sign, curve, data)
+        if at_low > 0.0 > at_high:
+            angle = false_position(_slope_at, low, high, at_low, at_high, sign, curve, data)
         else:
-            angle = bisected(_rises, low, high, c, s, sign)[0]
-        height = sign * series(c, s, angle)[0]
+            angle = bisected(_rises, low, high, sign, curve, data)[0]
+        height = sign * curve(angle, *data)[0]
     return angle, height
+
+
+@part
+def highest_top(
+    curve: Callable[..., tuple[float, float]], sign: float, samples: Array, level: float, data: Any
+) -> tuple[float, float, int]:
+    """Find crank angle and height of the highest top, and the sample at it; arguments as of :func:`top_at`.
+
+    The top at the highest sample counts unless another exceeds it by more than ``level``, the rounding.
+    """
+    best = int(np.argmax(samples))
+    where, highest = top_at(curve, sign, samples, best, -math.inf, data)
+    first = best
+    for j in range(samples.size):
+        if j != first:
+            angle, height = top_at(curve, sign, samples, j, highest + level, data)
+            if height > highest:
+                highest, where, best = height, angle, j
+    return where, highest, best
 
 
 @part
@@ -228,27 +258,17 @@ def _peak(c: Array, s: Array, sign: float, look: Array, err: float) -> tuple[flo
 
     Of tops that differ by less than twice their error, a share ``err`` of the size, the first of the turn counts.
     """
-    n, best, size = look.size, 0, 0.0
-    for j in range(n):
-        best = j if sign * look[j] > sign * look[best] else best
-        size = max(size, abs(look[j]))
-    where, highest = _top(c, s, sign, look, best, -math.inf)
-    for j in range(n):
-        if j == best:
-            continue
-        # a level curve has rounding tops alone
-        angle, height = _top(c, s, sign, look, j, highest + LEVEL * size)
-        if height > highest:
-            highest, where, best = height, angle, j
+    samples, size = sign * look, float(np.abs(look).max())
+    # a level curve has rounding tops alone
+    where, highest, best = highest_top(_series_at, sign, samples, LEVEL * size, (c, s))
     # A place closer to the end of the turn than its error counts as just after its beginning.
-    early = -math.sqrt(err)
-    for j in range(best if where >= early else n):
-        least = highest - 2.0 * err * size
-        angle, height = _top(c, s, sign, look, j, least)
+    early, least = -math.sqrt(err), highest - 2.0 * err * size
+    for j in range(best if where >= early else look.size):
+        angle, height = top_at(_series_at, sign, samples, j, least, (c, s))
         if height >= least and angle >= early:
             where = angle
             break
-    return sign * highest, where + 2.0 * math.pi if where < 0.0 else where
+    return sign * highest, where + TWO_PI if where < 0.0 else where
 
 
 STEPS, STILL = 6, 1e-6  # most steps to a top; a step shorter than STILL [rad] leaves an error far below rounding

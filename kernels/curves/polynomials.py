@@ -27,49 +27,19 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from kernels.curves.root_search import middle, newton_root
 from kernels.jit import inline
 from kernels.types import Array
 
 
 @inline
-def value_and_slope(p: Array, degree: int, x: float) -> tuple[float, float]:
+def value_and_slope(x: float, p: Array, degree: int) -> tuple[float, float]:
     """Return p[0] + p[1] x + ... and its derivative."""
     value, slope = p[degree], 0.0
     for j in range(degree - 1, -1, -1):
         slope = slope * x + value
         value = value * x + p[j]
     return value, slope
-
-
-@inline
-def middle(low: float, high: float) -> float:
-    """Middle of a bracket, in the logarithm where the bracket spans more than a factor of four."""
-    if low == 0.0:
-        return high * 2.0**-8
-    if high > 4.0 * low:
-        return math.sqrt(low) * math.sqrt(high)
-    return 0.5 * (low + high)
-
-
-@inline
-def bracketed_root(p: Array, degree: int, low: float, high: float, at_low: float) -> float:
-    """Find the root of p between low and high, where its signs differ, by bracketed Newton steps; nan on failure."""
-    x, before = middle(low, high), math.inf
-    for _ in range(200):
-        value, slope = value_and_slope(p, degree, x)
-        if value == 0.0:
-            return x
-        if (value < 0.0) == (at_low < 0.0):
-            low = x
-        else:
-            high = x
-        following = x - value / slope
-        if not (low < following < high) or abs(value) > 0.5 * before:
-            following = middle(low, high)
-        if abs(following - x) <= 2.0**-51 * x or not (low < following < high):
-            return following
-        x, before = following, abs(value)
-    return math.nan
 
 
 @inline
@@ -99,9 +69,10 @@ def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Ar
         low, at_low, kept = 0.0, q[0], 0
         for j in range(count + 1):
             high = found[j] if j < count else end
-            at_high, _ = value_and_slope(q, q_degree, high)
+            at_high, _ = value_and_slope(high, q, q_degree)
             if (at_low < 0.0) != (at_high < 0.0):
-                found[kept] = bracketed_root(q, q_degree, low, high, at_low)  # kept <= j: that knot has been read
+                # kept <= j: that knot has been read
+                found[kept] = newton_root(value_and_slope, low, high, at_low, middle(low, high), q, q_degree)
                 kept += 1
             low, at_low = high, at_high
         count = kept

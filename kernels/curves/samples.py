@@ -22,6 +22,8 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 FLAT = 1e-9
+GRAVITY = np.ones(256, np.int64)  # by status: the graver one counts for the whole turn
+GRAVITY[[st.OK, st.DEAD_POINT, st.SINGULAR, st.NOT_ASSEMBLED, st.INVALID_INPUT]] = 0, 2, 3, 4, 5
 
 
 @inline
@@ -39,23 +41,10 @@ def worst_status(status: Status, worst: Status) -> None:
     worst : (n,) out; INVALID_INPUT before NOT_ASSEMBLED, SINGULAR, DEAD_POINT and any other status but OK
     """
     for i in range(status.shape[0]):
-        grave, worst_code = 0, st.OK
+        worst[i] = st.OK
         for j in range(status.shape[1]):
-            code = status[i, j]
-            if code == st.OK:
-                continue
-            rank = 1
-            if code == st.INVALID_INPUT:
-                rank = 5
-            elif code == st.NOT_ASSEMBLED:
-                rank = 4
-            elif code == st.SINGULAR:
-                rank = 3
-            elif code == st.DEAD_POINT:
-                rank = 2
-            if rank > grave:
-                grave, worst_code = rank, code
-        worst[i] = worst_code
+            if GRAVITY[status[i, j]] > GRAVITY[worst[i]]:
+                worst[i] = status[i, j]
 
 
 @kernel

@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.polynomials import value_and_slope
-from kernels.curves.root_search import bisected
+from kernels.curves.root_search import bisected, least_value
 from kernels.effects.foot import (
     FLIGHT,
     PLATE,
@@ -39,8 +39,6 @@ LYING = 3  # on the fabric, in place of PLATE and RACK
 TERMS = 22  # of the power series: over a radian the next term is below 2^-53
 PARTS = 4  # least number per cell
 MOST_PARTS = 4096  # per cell: with more the fabric would swing 650 times within a five-hundredth of a turn
-_SECTIONS = 40  # golden sections: a peak's place to 4e-9 of a piece, its height to rounding
-_GOLDEN = 0.6180339887498949
 _MOST_EVENTS = 64
 ALIKE = 1e-6  # largest difference of turns that count as equal, as a share of the height of foot or rack
 ROUNDING = 2.0**-36  # the same between two turns by rounding alone, as angles are counted over many turns
@@ -81,7 +79,7 @@ def _motion(foot: Foot, fabric: Fabric, y: float, v: float, angle: float, ground
 @inline
 def _press(fabric: Fabric, ground: Array, y: float, v: float, x: float, angle: float) -> tuple[float, float]:
     """Force and compression of the fabric under a foot at height y with speed v; (14)."""
-    g, slope = value_and_slope(ground, 5, x)
+    g, slope = value_and_slope(x, ground, 5)
     return fabric.stiffness * (g - y) + fabric.damping * (slope / angle - v), g - y
 
 
@@ -94,7 +92,7 @@ def _look(
         y, v = flown(foot, state, piece.begin + x * piece.angle)
         force, depth = _press(fabric, ground, y, v, x, piece.angle)
         return -min(force, depth * fabric.stiffness), y, v
-    y, slope = value_and_slope(series, TERMS - 1, x)
+    y, slope = value_and_slope(x, series, TERMS - 1)
     force, _ = _press(fabric, ground, y, slope / piece.angle, x, piece.angle)
     return force, y, slope / piece.angle
 
@@ -117,6 +115,13 @@ def _event(foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array
     return 2.0
 
 
+@inline
+def _force(
+    x: float, sense: float, foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array
+) -> float:
+    return sense * _look(foot, fabric, state, piece, ground, series, x)[0]
+
+
 @kernel
 def _borne_between(
     foot: Foot, fabric: Fabric, state: State, piece: Piece, ground: Array, series: Array, end: float, tally: Array
@@ -133,16 +138,9 @@ def _borne_between(
     least, most = min(first, middle, last), max(first, middle, last)
     beats = most + abs(bend) > tally[7] or (piece.on_rack and least - abs(bend) < tally[8])
     if beats and abs(first - last) < 3.0 * abs(bend):
-        low, high, sense = 0.0, end, math.copysign(1.0, bend)
-        for _ in range(_SECTIONS):
-            one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-            at_one = _look(foot, fabric, state, piece, ground, series, one)[0]
-            at_two = _look(foot, fabric, state, piece, ground, series, two)[0]
-            if sense * at_one < sense * at_two:
-                high = two
-            else:
-                low = one
-            least, most = min(least, at_one, at_two), max(most, at_one, at_two)
+        sense = math.copysign(1.0, bend)
+        extreme = sense * least_value(_force, 0.0, end, sense, foot, fabric, state, piece, ground, series)[1]
+        least, most = min(least, extreme), max(most, extreme)
     tally[7] = max(tally[7], most)
     if piece.on_rack:
         tally[8] = min(tally[8], max(least, 0.0))
@@ -170,7 +168,7 @@ def _stretch(
     phi = piece.begin + end * piece.angle
     if piece.on_rack:
         quintic(path, 3, piece.j, piece.low, size, along)
-        way = value_and_slope(along, 5, end)[0] - along[0]
+        way = value_and_slope(end, along, 5)[0] - along[0]
         tally[5] += way
         if state.mode == FLIGHT:
             tally[3] += end * piece.angle
@@ -187,7 +185,7 @@ def _stretch(
             tally[1] = phi
         note(tally, phi, FLIGHT)
         return State(FLIGHT, phi, y, v, phi), end
-    _, slope = value_and_slope(ground, 5, end)
+    _, slope = value_and_slope(end, ground, 5)
     tally[6] = max(tally[6], slope / piece.angle - v)
     if not math.isnan(tally[1]) and math.isnan(tally[2]):
         tally[2] = phi

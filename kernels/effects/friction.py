@@ -13,7 +13,8 @@ pass is a sum of four vectors.  Their norms bound the contraction: rho(L) < 1 pr
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -145,6 +146,7 @@ def friction_loads(
     status : also JAMMED where the iteration does not contract
     """
     answers, total, matrix = np.empty((4, ANSWER)), np.empty(ANSWER), np.empty((3, 3))
+    shares, new, steps, weights = np.empty(3), np.empty(3), np.empty(3), np.ones(3)
     for i in range(poses.shape[0]):
         rubbing = _columns(friction, i)
         for k in range(poses.shape[1]):
@@ -158,13 +160,13 @@ def friction_loads(
             # A rocker turns about k on two supports, a slider moves along tau on two shoes.
             axis = mix(j.turns, j.k, 1.0 - j.turns, j.tau)
             unit = _answers(j, coupler, load, finger[i], f, speed_d, answers)
-            at = _settled(code == st.OK, answers, f, axis, speed_d, unit, total)
-            if code == st.OK and not at.converged:
+            passes = settled(_couples, shares, new, steps, weights, answers, f, axis, speed_d, unit, total)
+            if code == st.OK and passes < 0:
                 code = st.JAMMED
             status[i, k] = code
             good = 1.0 if code == st.OK else math.nan
             # The crank's bearing feeds nothing back: its torque follows from the reactions with the other three.
-            _total(answers, at.x, at.y, at.z, total)
+            _total(answers, shares, total)
             moment_a = (total[12], total[13], total[14])
             on_a = supports((total[0], total[1], total[2]), moment_a, j.u, f.z_a1, f.z_a2)
             t_a = _shaft_torque(f.mu_a, f.r_a, f.rt_a, on_a, speed_a)
@@ -178,10 +180,10 @@ def friction_loads(
                 couples[i, k, 1] = good * (total[19] - t_a)
             if losses is not None:
                 on = _guidance(total, axis, f)
-                losses[i, k, 0], losses[i, k, 1] = good * t_a, good * at.t_d
-                losses[i, k, 2], losses[i, k, 3] = good * at.size_b, good * at.size_c
+                losses[i, k, 0], losses[i, k, 1] = good * t_a, good * (shares[2] * unit[2])
+                losses[i, k, 2], losses[i, k, 3] = good * (shares[0] * unit[0]), good * (shares[1] * unit[1])
                 losses[i, k, 4], losses[i, k, 5] = good * on_a[0], good * on_a[1]
-                losses[i, k, 6], losses[i, k, 7], losses[i, k, 8] = good * on[0], good * on[1], good * at.passes
+                losses[i, k, 6], losses[i, k, 7], losses[i, k, 8] = good * on[0], good * on[1], good * passes
             if contraction is not None:
                 known = code == st.OK or code == st.JAMMED
                 contraction[i, k] = _contraction(answers, matrix, f, axis, unit) if known else math.nan
@@ -212,50 +214,64 @@ def _answers(
     return unit_b, unit_c, unit_d
 
 
-class Couples(NamedTuple):
-    """Result of the iteration: couples of B, C, guidance as multiples of their first guesses, then their sizes."""
+@inline
+def settled(update: Callable[..., None], loads: Array, new: Array, steps: Array, weights: Array, *data: Any) -> int:
+    """Find the loads that agree with the reactions they cause, by successive approximations from 0.
 
-    x: float
-    y: float
-    z: float
-    size_b: float
-    size_c: float
-    t_d: float
-    passes: int
-    converged: bool
+    Parameters
+    ----------
+    update : ``update(loads, new, *data)`` writes the loads under the reactions that friction at ``loads`` causes
+    loads : (Q,) out
+    new, steps : (Q,) scratch
+    weights : (Q,) friction per unit of each load; a load without friction changes nothing
+
+    Returns
+    -------
+    Number of passes; -1 without convergence.
+    """
+    last, least, stalled, passes, count, largest = math.inf, math.inf, 0, -1, 0, 0.0
+    for which in range(loads.shape[0]):
+        loads[which], steps[which] = 0.0, 0.0
+    while passes < 0 and stalled < STALLED and count < PASSES:
+        count += 1
+        change, step, along, square, whole, rounding = 0.0, 0.0, 0.0, 0.0, 0.0, ROUNDING * largest
+        update(loads, new, *data)
+        for which in range(loads.shape[0]):
+            weight, before = weights[which], steps[which]
+            apart, size = new[which] - loads[which], max(new[which], loads[which])
+            steps[which], largest = apart, max(largest, size)
+            # A load next to its zero cannot settle to its own size: its last digits are those of the other loads.
+            size = max(size, rounding)
+            if weight > 0.0:
+                change = max(change, abs(apart) / size if size > 0.0 else 0.0)
+                step = max(step, weight * abs(apart))
+                along += apart * before
+                square += before * before
+                whole += apart * apart
+        # The last digits fluctuate: a change at rounding level is convergence, not a stall.
+        if math.isfinite(step) and (change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)):
+            passes = count
+        last = change
+        # The relative change of loads decreases even while they grow without bound, so absolute steps are compared.
+        stalled = 0 if step < least else stalled + 1
+        least, further = step, 1.0
+        if count % LEAP == 0 and passes < 0:
+            further, least = leap(along, square, whole), math.inf
+        for which in range(loads.shape[0]):
+            loads[which] = max(loads[which] + further * (new[which] - loads[which]), 0.0)
+    return passes
 
 
 @inline
-def _settled(
-    assembled: bool, answers: Array, f: Friction, axis: Vector, speed_d: float, unit: Vector, total: Array
-) -> Couples:
-    """Find the friction couples that agree with the reactions they cause, by successive approximations."""
-    x, y, z, size_b, size_c, t_d = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    dx0, dy0, dz0, last, least = 0.0, 0.0, 0.0, math.inf, math.inf
-    stalled, count, converged = 0, 0, False
-    while assembled and not converged and count < PASSES and stalled < STALLED:
-        count += 1
-        _total(answers, x, y, z, total)
-        size_b = f.mu_b * f.r_b * norm((total[3], total[4], total[5]))
-        size_c = f.mu_c * f.r_c * norm((total[6], total[7], total[8]))
-        t_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
-        dx, dy, dz = _share(size_b, unit[0]) - x, _share(size_c, unit[1]) - y, _share(t_d, unit[2]) - z
-        change = _largest_change(x, dx, y, dy, z, dz)
-        # The last digits fluctuate: a change at rounding level is convergence, not a stall.
-        converged = change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)
-        converged = converged and math.isfinite(dx + dy + dz)
-        last = change
-        # The relative change of couples decreases even while they grow without bound, so absolute steps are compared.
-        step = max(abs(dx), max(abs(dy), abs(dz)))
-        stalled = 0 if step < least else stalled + 1
-        least = step
-        further = 1.0
-        if count % LEAP == 0 and not converged:
-            square, size = dx0 * dx0 + dy0 * dy0 + dz0 * dz0, dx * dx + dy * dy + dz * dz
-            further, least = leap(dx * dx0 + dy * dy0 + dz * dz0, square, size), math.inf
-        x, y, z = max(x + further * dx, 0.0), max(y + further * dy, 0.0), max(z + further * dz, 0.0)
-        dx0, dy0, dz0 = dx, dy, dz
-    return Couples(x, y, z, size_b, size_c, t_d, count, converged)
+def _couples(
+    shares: Array, new: Array, answers: Array, f: Friction, axis: Vector, speed_d: float, unit: Vector, total: Array
+) -> None:
+    """Write the couples of B, C and the guidance under the reactions to some, as multiples of their first guesses."""
+    _total(answers, shares, total)
+    t_d = _shaft_torque(f.mu_d, f.r_d, f.rt_d, _guidance(total, axis, f), speed_d)
+    new[0] = _share(f.mu_b * f.r_b * norm((total[3], total[4], total[5])), unit[0])
+    new[1] = _share(f.mu_c * f.r_c * norm((total[6], total[7], total[8])), unit[1])
+    new[2] = _share(t_d, unit[2])
 
 
 @inline
@@ -264,10 +280,12 @@ def _share(size: float, unit: float) -> float:
 
 
 @inline
-def _total(answers: Array, x: float, y: float, z: float, total: Array) -> None:
+def _total(answers: Array, shares: Array, total: Array) -> None:
     """Sum the reactions without friction and to the three couples, which are multiples of their first guesses."""
     for at in range(ANSWER):
-        total[at] = answers[0, at] + x * answers[1, at] + y * answers[2, at] + z * answers[3, at]
+        total[at] = (
+            answers[0, at] + shares[0] * answers[1, at] + shares[1] * answers[2, at] + shares[2] * answers[3, at]
+        )
 
 
 @inline
@@ -315,17 +333,3 @@ def leap(along: float, square: float, size: float) -> float:
     """
     straight = along < 0.0 or along * along > STRAIGHT * square * size
     return square / (square - along) if abs(along) < square and straight else 1.0
-
-
-@inline
-def _largest_change(x: float, dx: float, y: float, dy: float, z: float, dz: float) -> float:
-    """Largest relative change of a couple.
-
-    A couple next to its zero cannot settle to its own size: its last digits are those of the other loads.
-    """
-    worst, rounding = 0.0, ROUNDING * max(abs(x), max(abs(y), abs(z)))
-    for old, change in ((x, dx), (y, dy), (z, dz)):
-        size = max(max(abs(old), abs(old + change)), rounding)
-        if size > 0.0:
-            worst = max(worst, abs(change) / size)
-    return worst

@@ -17,17 +17,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.vectors import Vector, add, cross, dot, mix, norm, scale, sub
-from kernels.effects.friction import (
-    LEAP,
-    PASSES,
-    ROUNDING,
-    STALLED,
-    STILL,
-    TOLERANCE,
-    leap,
-    support_forces,
-    unit_vector,
-)
+from kernels.effects.friction import STILL, settled, support_forces, unit_vector
 from kernels.effects.link_loads import (
     BODY_OF,
     CONTACT,
@@ -164,41 +154,11 @@ def _sum(answers: Array, loads: Array, total: Array) -> None:
 
 
 @inline
-def _settled(joints: Index, friction: Array, parts: Array, loads: Array, new: Array, steps: Array) -> int:
-    """Iterate the loads (Q,) to convergence; return the passes, -1 without.  ``new``, ``steps`` are scratch."""
-    last, least, stalled, part, passes, count = math.inf, math.inf, 0, steps[1], -1, 0
-    largest = 0.0
-    for which in range(loads.shape[0]):
-        loads[which], steps[0, which] = 0.0, 0.0
-    while passes < 0 and stalled < STALLED and count < PASSES:
-        count += 1
-        change, step, along, square, whole, rounding = 0.0, 0.0, 0.0, 0.0, 0.0, ROUNDING * largest
-        for which in range(joints.shape[0]):
-            _sum(parts[which], loads, part[:PART])
-            new[which] = _sizes(joints[which], friction[which], part)[0]
-            mu, before = friction[which, MU], steps[0, which]
-            apart, size = new[which] - loads[which], max(new[which], loads[which])
-            steps[0, which], largest = apart, max(largest, size)
-            # A load next to its zero cannot settle to its own size: its last digits are those of the other loads.
-            size = max(size, rounding)
-            if mu > 0.0:
-                change = max(change, abs(apart) / size if size > 0.0 else 0.0)
-                step = max(step, mu * abs(apart))
-                along += apart * before
-                square += before * before
-                whole += apart * apart
-        # The last digits fluctuate: a change at rounding level is convergence, not a stall.
-        if math.isfinite(step) and (change <= TOLERANCE or (count > 3 and change < 1e-12 and change >= last)):
-            passes = count
-        last = change
-        # The relative change of loads decreases even while they grow without bound, so absolute steps are compared.
-        stalled = 0 if step < least else stalled + 1
-        least, further = step, 1.0
-        if count % LEAP == 0 and passes < 0:
-            further, least = leap(along, square, whole), math.inf
-        for which in range(joints.shape[0]):
-            loads[which] = max(loads[which] + further * (new[which] - loads[which]), 0.0)
-    return passes
+def _new_loads(loads: Array, new: Array, joints: Index, friction: Array, parts: Array, part: Array) -> None:
+    """Write the loads of all joints under the reactions that friction at these loads causes."""
+    for which in range(joints.shape[0]):
+        _sum(parts[which], loads, part)
+        new[which] = _sizes(joints[which], friction[which], part)[0]
 
 
 @kernel
@@ -228,7 +188,7 @@ def link_friction(
     """
     number = joints.shape[0]
     room, parts = room_for(links, number, number), np.empty((number, 1 + number, PART))
-    loads, new, steps = np.empty(number), np.empty(number), np.empty((2, max(number, PART)))
+    loads, new, steps, part = np.empty(number), np.empty(number), np.empty(number), np.empty(PART)
     power, total = np.empty(number), np.empty(WRENCH)
     lines = room.rows.shape[0]
     for i in range(status.shape[0]):
@@ -247,8 +207,8 @@ def link_friction(
                 status[i, k] = st.DEAD_POINT
             put_reactions(joints, room)
             _put_parts(links, i, k, joints, friction[i], room, parts)
-            solved, passes = status[i, k] == st.OK, _settled(joints, friction[i], parts, loads, new, steps)
-            if solved and passes < 0:
+            passes = settled(_new_loads, loads, new, steps, friction[i, :, MU], joints, friction[i], parts, part)
+            if status[i, k] == st.OK and passes < 0:
                 status[i, k] = st.JAMMED
             good = 1.0 if status[i, k] == st.OK else math.nan
             if torque is not None:
@@ -259,8 +219,8 @@ def link_friction(
             if forces is not None:
                 _store(links, i, k, joints, room, loads, good, total, forces)
             for which in range(number):
-                _sum(parts[which], loads, steps[1, :PART])
-                _, first, other = _sizes(joints[which], friction[i, which], steps[1])
+                _sum(parts[which], loads, part)
+                _, first, other = _sizes(joints[which], friction[i, which], part)
                 if lost is not None:
                     lost[i, k, which] = -good * loads[which] * power[which]
                 if on_supports is not None:

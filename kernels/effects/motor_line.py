@@ -14,6 +14,7 @@ motor's time constant, halved until the energy no longer changes.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,6 +26,26 @@ NEWTON = 40
 LARGEST_STEP = 2.0 * math.pi / 256
 OF_TIME_CONSTANT = 0.1  # step over the motor's time constant
 MOST_STEPS = 1 << 17
+
+
+class Drive(NamedTuple):
+    """Inertia and torque excess at 2 N angles of a turn, mean speed and slope of the motor line."""
+
+    inertia: Array
+    excess: Array
+    mean_speed: float
+    slope: float
+
+
+class March(NamedTuple):
+    """Energy and time at an angle, each with its derivatives by T(0) and M; or the slopes of all six."""
+
+    energy: float
+    energy_start: float
+    energy_torque: float
+    time: float
+    time_start: float
+    time_torque: float
 
 
 @kernel
@@ -58,7 +79,8 @@ def steady_energy(
         inertia, excess, room = np.empty(points), np.empty(points), np.empty((4, points))
         on_grid(jc, js, room, inertia)
         on_grid(xc, xs, room, excess)
-        start, torque = _shoot(inertia, excess, mean_speed, slope, scale, start, torque, between, energy)
+        drive = Drive(inertia, excess, mean_speed, slope)
+        start, torque = _shoot(drive, scale, start, torque, between, energy)
         if not math.isfinite(start):
             return False
         if abs(start - last) <= still * scale:
@@ -69,29 +91,19 @@ def steady_energy(
 
 
 @inline
-def _shoot(
-    inertia: Array,
-    excess: Array,
-    mean_speed: float,
-    slope: float,
-    scale: float,
-    start: float,
-    torque: float,
-    between: int,
-    energy: Array,
-) -> tuple[float, float]:
+def _shoot(drive: Drive, scale: float, start: float, torque: float, between: int, energy: Array) -> tuple[float, float]:
     """Find T(0) and M of the periodic solution with the given mean speed; nan where Newton's method finds none."""
-    wanted = 2.0 * math.pi / mean_speed
+    wanted = 2.0 * math.pi / drive.mean_speed
     for _ in range(NEWTON):
-        end, by_start, by_torque, time, time_start, time_torque = _march(
-            inertia, excess, mean_speed, slope, start, torque, between, energy
-        )
-        if not math.isfinite(end + time):
+        end = _march(drive, start, torque, between, energy)
+        if not math.isfinite(end.energy + end.time):
             return math.nan, math.nan
-        # [by_start - 1, by_torque; time_start, time_torque] (change of T, change of M) = -(end - start, time - wanted)
-        first, second, det = start - end, wanted - time, (by_start - 1.0) * time_torque - by_torque * time_start
-        more_start = (first * time_torque - by_torque * second) / det
-        more_torque = ((by_start - 1.0) * second - time_start * first) / det
+        # [energy_start - 1, energy_torque; time_start, time_torque] (change of T, change of M)
+        # = -(end - start, time - wanted)
+        first, second, by_start = start - end.energy, wanted - end.time, end.energy_start - 1.0
+        det = by_start * end.time_torque - end.energy_torque * end.time_start
+        more_start = (first * end.time_torque - end.energy_torque * second) / det
+        more_torque = (by_start * second - end.time_start * first) / det
         # The energy must stay positive: never more than half of it is taken away at once.
         share = 1.0 if start + more_start > 0.5 * start else -0.5 * start / more_start
         start, torque = start + share * more_start, torque + share * more_torque
@@ -103,68 +115,49 @@ def _shoot(
 
 
 @inline
-def _march(
-    inertia: Array,
-    excess: Array,
-    mean_speed: float,
-    slope: float,
-    start: float,
-    torque: float,
-    between: int,
-    energy: Array,
-) -> tuple[float, float, float, float, float, float]:
-    """Integrate one turn: T at its end, its time, and derivatives of both by T(0) and M; T is written on the grid."""
-    points = inertia.size
-    step = 4.0 * math.pi / points
-    t, by_start, by_torque, time, time_start, time_torque = start, 1.0, 0.0, 0.0, 0.0, 0.0
+def _march(drive: Drive, start: float, torque: float, between: int, energy: Array) -> March:
+    """Integrate one turn: energy and time at its end; the energy is written on the grid."""
+    points = drive.inertia.size
+    step, at = 4.0 * math.pi / points, March(start, 1.0, 0.0, 0.0, 0.0, 0.0)
     for j in range(0, points, 2):
         if (j >> 1) % between == 0:
-            energy[(j >> 1) // between] = t
-        a1, b1, c1, d1, e1, f1 = _rates(inertia[j], excess[j], mean_speed, slope, torque, t, by_start, by_torque)
-        h = 0.5 * step
-        j2, x2 = inertia[j + 1], excess[j + 1]
-        a2, b2, c2, d2, e2, f2 = _rates(
-            j2, x2, mean_speed, slope, torque, t + h * a1, by_start + h * b1, by_torque + h * c1
-        )
-        a3, b3, c3, d3, e3, f3 = _rates(
-            j2, x2, mean_speed, slope, torque, t + h * a2, by_start + h * b2, by_torque + h * c2
-        )
-        j4, x4 = inertia[(j + 2) % points], excess[(j + 2) % points]
-        a4, b4, c4, d4, e4, f4 = _rates(
-            j4, x4, mean_speed, slope, torque, t + step * a3, by_start + step * b3, by_torque + step * c3
-        )
-        w = step / 6.0
-        t += w * (a1 + 2.0 * (a2 + a3) + a4)
-        by_start += w * (b1 + 2.0 * (b2 + b3) + b4)
-        by_torque += w * (c1 + 2.0 * (c2 + c3) + c4)
-        time += w * (d1 + 2.0 * (d2 + d3) + d4)
-        time_start += w * (e1 + 2.0 * (e2 + e3) + e4)
-        time_torque += w * (f1 + 2.0 * (f2 + f3) + f4)
-    return t, by_start, by_torque, time, time_start, time_torque
+            energy[(j >> 1) // between] = at.energy
+        one = _rates(drive, j, torque, at)
+        two = _rates(drive, j + 1, torque, _moved(at, 0.5 * step, one))
+        three = _rates(drive, j + 1, torque, _moved(at, 0.5 * step, two))
+        four = _rates(drive, (j + 2) % points, torque, _moved(at, step, three))
+        total = _moved(_moved(one, 2.0, _moved(two, 1.0, three)), 1.0, four)
+        at = _moved(at, step / 6.0, total)
+    return at
 
 
 @inline
-def _rates(
-    inertia: float,
-    excess: float,
-    mean_speed: float,
-    slope: float,
-    torque: float,
-    t: float,
-    by_start: float,
-    by_torque: float,
-) -> tuple[float, float, float, float, float, float]:
-    """Compute the slopes by phi of T, its derivatives by T(0) and M, the time and its two derivatives."""
-    if not t > 0.0:
-        return math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
-    omega = math.sqrt(2.0 * t / inertia)
+def _moved(at: March, step: float, rates: March) -> March:
+    """Return the march moved by a step, or a sum of two rates."""
+    return March(
+        at.energy + step * rates.energy,
+        at.energy_start + step * rates.energy_start,
+        at.energy_torque + step * rates.energy_torque,
+        at.time + step * rates.time,
+        at.time_start + step * rates.time_start,
+        at.time_torque + step * rates.time_torque,
+    )
+
+
+@inline
+def _rates(drive: Drive, j: int, torque: float, at: March) -> March:
+    """Compute the slopes by phi at angle j."""
+    inertia, slope = drive.inertia[j], drive.slope
+    if not at.energy > 0.0:
+        return March(math.nan, math.nan, math.nan, math.nan, math.nan, math.nan)
+    omega = math.sqrt(2.0 * at.energy / inertia)
     per_energy = 1.0 / (inertia * omega)
     damped, slower = -slope * per_energy, -per_energy / (omega * omega)
-    return (
-        excess + torque - slope * (omega - mean_speed),
-        damped * by_start,
-        1.0 + damped * by_torque,
+    return March(
+        drive.excess[j] + torque - slope * (omega - drive.mean_speed),
+        damped * at.energy_start,
+        1.0 + damped * at.energy_torque,
         1.0 / omega,
-        slower * by_start,
-        slower * by_torque,
+        slower * at.energy_start,
+        slower * at.energy_torque,
     )

@@ -17,16 +17,15 @@ from kernels import status as st
 from kernels.curves.periodic import (
     LEVEL,
     coefficients,
-    height_bound,
+    highest_top,
     on_grid,
     series,
     series_at,
     significant,
     tail,
 )
-from kernels.curves.root_search import bisected
 from kernels.effects.motor_line import steady_energy
-from kernels.jit import inline, kernel, part
+from kernels.jit import inline, kernel
 from kernels.types import Array, Status
 
 NEWTON = 60
@@ -224,42 +223,18 @@ def _energy(inertia: Array, work: Array, mean_speed: float, e: float) -> float:
 
 
 @inline
-def _rises(phi: float, jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float) -> bool:
-    """Whether sign times the speed rises; its slope has the sign of W' J - (E + W) J'."""
-    j_red, dj = series(jc, js, phi)
-    w, dw = series(wc, ws, phi)
-    return sign * (dw * j_red - (e + w) * dj) > 0.0
-
-
-@inline
-def _sample(j: int, e: float, sign: float, inertia: Array, work: Array) -> float:
-    """Sign times half the square of the speed at a sample."""
-    value: float = sign * (e + work[j]) / inertia[j]
-    return value
-
-
-@part
-def _top(j: int, samples: int, jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float) -> float:
-    """Sign times half the square of the speed at the top next to a sample: its slope's zero by bisection."""
-    step = 2.0 * math.pi / samples
-    low, high = bisected(_rises, step * (j - 1), step * (j + 1), jc, js, wc, ws, e, sign)
-    middle = 0.5 * (low + high)
-    return sign * (e + series(wc, ws, middle)[0]) / series(jc, js, middle)[0]
+def _half_square(phi: float, jc: Array, js: Array, wc: Array, ws: Array, e: float) -> tuple[float, float]:
+    """Half the square of the speed, (E + W)/J, and its slope."""
+    inertia, inertia1 = series(jc, js, phi)
+    work, work1 = series(wc, ws, phi)
+    value = (e + work) / inertia
+    return value, (work1 - value * inertia1) / inertia
 
 
 @inline
 def _extreme(jc: Array, js: Array, wc: Array, ws: Array, e: float, sign: float, inertia: Array, work: Array) -> float:
-    """Find the largest (sign +1) or smallest (-1) speed: the top at the best sample, or one that exceeds it."""
-    n, best, highest = work.size, 0, -math.inf
-    for j in range(n):
-        here = _sample(j, e, sign, inertia, work)
-        best, highest = (j, here) if here > highest else (best, highest)
-    highest = _top(best, n, jc, js, wc, ws, e, sign)
-    for j in range(n):
-        before, here = _sample(j - 1, e, sign, inertia, work), _sample(j, e, sign, inertia, work)
-        after = _sample((j + 1) % n, e, sign, inertia, work)
-        # an even speed has rounding tops alone
-        least = highest + LEVEL * abs(highest)
-        if j != best and here >= before and here >= after and height_bound(before, here, after) > least:
-            highest = max(highest, _top(j, n, jc, js, wc, ws, e, sign))
-    return math.sqrt(2.0 * abs(highest))
+    """Find the largest (sign +1) or smallest (-1) speed."""
+    samples = sign * (e + work) / inertia
+    # an even speed has rounding tops alone
+    level = LEVEL * float(np.abs(samples).max())
+    return math.sqrt(2.0 * abs(highest_top(_half_square, sign, samples, level, (jc, js, wc, ws, e))[1]))

@@ -15,10 +15,9 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude, unit_near
-from kernels.curves.periodic import harmonics
-from kernels.curves.root_search import bisected
+from kernels.curves.periodic import harmonics, highest_top
 from kernels.jit import inline, kernel
-from kernels.linkage.outputs import put_block, write
+from kernels.linkage.outputs import put_block, write, write_number
 from kernels.linkage.verdict import pose_status
 from kernels.types import EPS, TWO_PI, Array, Status
 
@@ -68,12 +67,9 @@ def follower(data: Array, status: Status, S: Array | None, dS: Array | None, d2S
         good = 1.0 if code == st.OK else math.nan
         s = math.sqrt(square) if code == st.OK else 0.0 if code == st.DEAD_POINT else math.nan
         ds, d2s = follow(good * s, thread, first, second)
-        if S is not None:
-            S[i] = s
-        if dS is not None:
-            dS[i] = ds
-        if d2S is not None:
-            d2S[i] = d2s
+        write_number(S, i, s)
+        write_number(dS, i, ds)
+        write_number(d2S, i, d2s)
 
 
 @inline
@@ -145,32 +141,14 @@ def _curve(phi: float, designs: Array, i: int, needs: tuple[Reduced, float] | No
 
 
 @inline
-def _rises(phi: float, designs: Array, i: int, needs: tuple[Reduced, float] | None) -> bool:
-    return _curve(phi, designs, i, needs)[1] > 0.0
-
-
-@inline
 def _largest(designs: Array, i: int, needs: tuple[Reduced, float] | None, looks: int) -> tuple[float, float]:
-    """Find the largest value of a curve over the turn, and its cam angle, from ``looks`` samples.
-
-    The highest sample may stand on a top that is not the highest: each whose parabola may reach as high is followed to
-    the zero of the slope.
-    """
-    step, most = TWO_PI / looks, -math.inf
+    """Find the largest value of a curve over the turn, and its cam angle, from ``looks`` samples."""
+    samples = np.empty(looks)
     for j in range(looks):
-        most = max(most, _curve(step * j, designs, i, needs)[0])
-    best, where = -math.inf, 0.0
-    before, here = _curve(-step, designs, i, needs)[0], _curve(0.0, designs, i, needs)[0]
-    for j in range(looks):
-        after = _curve(step * (j + 1), designs, i, needs)[0]
-        if here >= max(before, after) and here + (here - min(before, after)) >= most:
-            low, _ = bisected(_rises, step * (j - 1), step * (j + 1), designs, i, needs)
-            # the larger of both: where two maxima share the bracket the bisection may have come to the lower one
-            value = max(_curve(low, designs, i, needs)[0], here)
-            if value > best:
-                best, where = value, low
-        before, here = here, after
-    return best, where
+        samples[j] = _curve(TWO_PI / looks * j, designs, i, needs)[0]
+    where, value, best = highest_top(_curve, 1.0, samples, 0.0, (designs, i, needs))
+    # where two tops share the bracket the search may have come to the lower one
+    return max(value, samples[best]), where
 
 
 @inline

@@ -21,6 +21,13 @@ def write(out: Numbers | None, i: int, j: int, value: Any) -> None:
 
 
 @inline
+def write_number(out: Numbers | None, i: int, value: Any) -> None:
+    """Write the value of a design if the output is wanted."""
+    if out is not None:
+        out[i] = value
+
+
+@inline
 def has_point(out: Any) -> bool:
     """Whether any output of the working point is wanted, which is known when the kernel is compiled."""
     return (

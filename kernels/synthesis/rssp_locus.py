@@ -14,6 +14,7 @@ import numpy as np
 from kernels.arithmetic.complex_step import divisor
 from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write_number
 from kernels.synthesis.acceptance import design_status, first_failure
 from kernels.types import EPS, TWO_PI, Array, Status
 
@@ -102,8 +103,7 @@ def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         point = abs(s0.real) > 4.0 * EPS
         at = Limits(start, end, middle, per * ca * u2, per * ca * u1, v1, v2, point)
         _finish(Given(stroke, e, f, alpha, sa, ca, valid), at, i, status, failed, designs)
-        if s1 is not None:
-            s1[i] = start if status[i] == 0 else math.nan
+        write_number(s1, i, start if status[i] == 0 else math.nan)
 
 
 @inline
@@ -159,10 +159,8 @@ def rssp_at_offset(
         side = (e * e + (ca * start) * (ca * end)) * c0 + e * ca * stroke * s0
         g = Given(stroke, e, f, alpha, sa, ca, valid)
         place = _between(g, start, end, middle, side, point, i, status, failed, designs)
-        if s1 is not None:
-            s1[i] = start if status[i] == 0 else math.nan
-        if phi1 is not None:
-            phi1[i] = place
+        write_number(s1, i, start if status[i] == 0 else math.nan)
+        write_number(phi1, i, place)
 
 
 @kernel
@@ -190,5 +188,4 @@ def rssp_at_place(
         if phi0 is not None:
             turn = math.atan2(e * ca * stroke, e * e + (s1 * ca) * (s2 * ca))
             phi0[i] = math.pi + turn if status[i] == 0 else math.nan
-        if phi1 is not None:
-            phi1[i] = place
+        write_number(phi1, i, place)

@@ -17,6 +17,7 @@ import numpy as np
 from kernels.arithmetic.complex_step import arctan2, divisor
 from kernels.arithmetic.sincos import sine_cosine
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write_number
 from kernels.synthesis.acceptance import design_status, first_failure
 from kernels.types import EPS, TWO_PI, Array, Status
 
@@ -138,8 +139,7 @@ def rssr_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         v1, u1 = sine_cosine(requirements[i, 2])
         p = _point(r, u1, v1)
         _finish(r, p, u1, v1, i, status, failed, designs)
-        if psi1 is not None:
-            psi1[i] = arctan2(p.y, p.x) if status[i] == 0 else math.nan
+        write_number(psi1, i, arctan2(p.y, p.x) if status[i] == 0 else math.nan)
 
 
 @kernel
@@ -176,8 +176,7 @@ def rssr_of_size(requirements: Array, status: Status, failed: Status, designs: A
         _finish(r, ball, u1, v1, i, status, failed, designs)
         if status[i] != 0:
             designs[i, 3], designs[i, 5] = math.nan, math.nan
-        if psi1 is not None:
-            psi1[i] = arctan2(ball.y, ball.x) if status[i] == 0 else math.nan
+        write_number(psi1, i, arctan2(ball.y, ball.x) if status[i] == 0 else math.nan)
 
 
 @kernel
@@ -255,5 +254,4 @@ def rssr_at_direction(
         point = near and inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
         _finish(r, _Point(x1, y1, rho1, back, point), u1, v1, i, status, failed, designs)
-        if phi1 is not None:
-            phi1[i] = math.atan2(v1, u1) if status[i] == 0 else math.nan
+        write_number(phi1, i, math.atan2(v1, u1) if status[i] == 0 else math.nan)

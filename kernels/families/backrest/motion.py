@@ -12,7 +12,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
-from kernels.curves.root_search import bisected, false_position
+from kernels.curves.root_search import bisected, false_position, least_value
 from kernels.families.backrest.closure import BracketPose, Mode, forces, place, residual, scaled, spring
 from kernels.jit import inline, kernel
 from kernels.types import Array, Status
@@ -39,23 +39,8 @@ def _bracketed(d: Array, a: float, fa: float, b: float, fb: float, rho: float, m
 
 
 @inline
-def _dip(d: Array, low: float, high: float, sign: float, rho: float, mode: int) -> tuple[float, float]:
-    """Find the angle where sign * residual is least between two angles by golden sections; stop once it is negative."""
-    share = 0.3819660112501051  # (3 - sqrt(5))/2: one new value per step serves the next one too
-    x, y = low + share * (high - low), high - share * (high - low)
-    fx, fy = sign * residual(d, x, rho, mode)[0], sign * residual(d, y, rho, mode)[0]
-    for _ in range(80):
-        if fx < 0.0 or fy < 0.0:
-            break
-        if fx < fy:
-            high, y, fy = y, x, fx
-            x = low + share * (high - low)
-            fx = sign * residual(d, x, rho, mode)[0]
-        else:
-            low, x, fx = x, y, fy
-            y = high - share * (high - low)
-            fy = sign * residual(d, y, rho, mode)[0]
-    return (x, sign * fx) if fx < fy else (y, sign * fy)
+def _size(phi: float, sign: float, d: Array, rho: float, mode: int) -> float:
+    return sign * residual(d, phi, rho, mode)[0]  # type: ignore[no-any-return]
 
 
 @inline
@@ -93,7 +78,9 @@ def all_roots(d: Array, rho: float, mode: int, roots: Array) -> int:
             left, _ = bisected(_defined, x2, x1, d, rho, mode)
             f_left, _ = residual(d, left, rho, mode)
         if ok0 and ok1 and ok2 and f0 * f1 > 0.0 and f1 * f2 > 0.0 and abs(f1) <= min(abs(f0), abs(f2)):
-            dip, f_dip = _dip(d, x0, x2, math.copysign(1.0, f1), rho, mode)
+            sign = math.copysign(1.0, f1)
+            dip, f_dip = least_value(_size, x0, x2, sign, d, rho, mode)
+            f_dip *= sign
             if f_dip * f1 <= 0.0:
                 count = _kept(roots, count, _bracketed(d, dip, f_dip, x0, f0, rho, mode))
                 count = _kept(roots, count, _bracketed(d, dip, f_dip, x2, f2, rho, mode))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from kernels import status as st
 from kernels.arithmetic.complex_step import unit_near
 from kernels.arithmetic.vectors import Vector
-from kernels.curves.arc_roots import arc_search
+from kernels.curves.arc_roots import scan
 from kernels.jit import inline, kernel
 from kernels.linkage.driven_ball import Crank, reduce_crank
 from kernels.linkage.slider_closure import Reduced as Slider
@@ -94,9 +94,7 @@ def _h(k: Loops, psi: float) -> float:
     return float(place(k, math.cos(psi), math.sin(psi)).value)
 
 
-# H is a trigonometric polynomial of degree 1 and one root of another: 48 cells separate its waves.  30 halvings of a
-# cell leave 1e-10 rad, which the caller's Newton steps reduce to rounding.
-_SCAN, _ = arc_search("shaft_angle", _h, 48, 30)
+CELLS = 48  # H is a trigonometric polynomial of degree 1 and one root of another: these separate its waves
 
 
 @inline
@@ -123,7 +121,7 @@ def shaft_angles(k: Loops, noise: float, at: NDArray[np.float64]) -> tuple[int, 
     centre, half = _arc(k)
     if half == 0.0:
         return 0, math.nan, math.nan
-    return _SCAN(k, centre, half, noise, 0, at)  # type: ignore[no-any-return]
+    return scan(_h, CELLS, k, centre, half, noise, 0, at)
 
 
 @kernel

@@ -30,7 +30,7 @@ import numpy as np
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor
 from kernels.arithmetic.sincos import sincos
-from kernels.curves.arc_roots import angle_at, arc_search, way_of
+from kernels.curves.arc_roots import angle_at, dip, scan, way_of
 from kernels.curves.polynomials import rotate
 from kernels.jit import inline, kernel
 from kernels.linkage.crank_closure import Reduced, axial_terms, reduce_scaled, unit_scale
@@ -191,10 +191,6 @@ def _closure(k: Terms, psi: float) -> float:
     return float(k.x * c - k.y * s + (k.w - k.joint.shift) - k.joint.share * math.sqrt(max(square, 0.0)))
 
 
-# 52 halvings of a cell reach its last bits; the caller's Newton steps remove the rest
-_SCAN, _DIP = arc_search("five_link", _closure, SAMPLES, 52)
-
-
 @kernel
 def _extremes_of_arc(k: Terms, centre: float, half: float) -> tuple[ClosureValue, ClosureValue]:
     """Find the smallest and the largest G5 on one arc, and their places."""
@@ -212,7 +208,7 @@ def _extremes_of_arc(k: Terms, centre: float, half: float) -> tuple[ClosureValue
         lo, hi = begin + step * (n - 1), begin + step * (n + 1)
         if half < math.pi:
             lo, hi = max(lo, 0.0), min(hi, math.pi)
-        tau, f = _DIP(k, centre, half, lo, hi, sign)
+        tau, f = dip(_closure, k, centre, half, lo, hi, sign)
         if sign > 0.0 and f < low.value:
             low = ClosureValue(angle_at(centre, half, tau), f)
         if sign < 0.0 and -f > high.value:
@@ -251,9 +247,9 @@ def all_roots(joint: Joint, x: float, y: float, w: float, noise: float, at: Arra
     number, centre, half, centre2, half2 = arcs(joint)
     k, count = Terms(joint, x, y, w), 0
     if number > 0:
-        count, _, _ = _SCAN(k, centre, half, noise, count, at)
+        count, _, _ = scan(_closure, SAMPLES, k, centre, half, noise, count, at)
     if number > 1:
-        count, _, _ = _SCAN(k, centre2, half2, noise, count, at)
+        count, _, _ = scan(_closure, SAMPLES, k, centre2, half2, noise, count, at)
     return count
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from kernels import status as st
 from kernels.arithmetic.complex_step import divisor, unit_near
+from kernels.curves.root_search import newton_root
 from kernels.jit import inline, kernel
 from kernels.linkage.outputs import write
 from kernels.linkage.thread_path import wrap_angle
@@ -24,7 +25,6 @@ from kernels.types import Array, Status
 # Two extrema nearer to each other than this share of the way searched may be missed: the dip between them is no deeper
 # than its third power.
 FINEST = 2.0**-16
-HALVINGS = 60
 
 
 # Edge and guides in the axes of the cam, lengths in units of ``unit``.
@@ -134,6 +134,13 @@ Contact = namedtuple("Contact", "y length minima")
 
 
 @inline
+def _slope(at: float, cam: Cam) -> tuple[float, float]:
+    """Real parts of the slope of the length along the edge and of its derivative."""
+    _, slope, bend = along_edge(cam, at)
+    return slope.real, bend.real
+
+
+@inline
 def shortest(cam: Cam) -> Contact:
     """Global minimum of the length over the edge; of minima equally long to rounding it is the first along y."""
     # All extrema lie within reach; the margin keeps one that lies on its very end inside the walk.
@@ -149,34 +156,13 @@ def shortest(cam: Cam) -> Contact:
         new = along_edge(cam, following)[1].real
         # only rising zeros are minima; the equality on one side alone counts a zero on a step's end once
         if slope < 0.0 <= new:
-            y = root_of_slope(cam, at, following)
+            y = newton_root(_slope, at, following, -1.0, 0.5 * (at + following), cam)
             length = along_edge(cam, y)[0].real
             minima += 1
             if length < best:
                 best, place = length, y
         at, slope = following, new
     return Contact(place, best, minima)
-
-
-@inline
-def root_of_slope(cam: Cam, low: float, high: float) -> float:
-    """Find the point between low and high where L' rises through zero, by Newton's method kept in the bracket."""
-    y = 0.5 * (low + high)
-    for _ in range(HALVINGS):
-        _, slope, bend = along_edge(cam, y)
-        if slope.real < 0.0:
-            low = y
-        else:
-            high = y
-        # Newton's step is good only near the root: where it leaves the bracket, its middle is taken.
-        following = y - slope.real / bend.real
-        if not (low < following < high):
-            following = 0.5 * (low + high)
-        # A middle that equals an end: the bracket is two neighbouring numbers.
-        if abs(following - y) <= 2.0**-52 * abs(y) or not (low < following < high):
-            return following
-        y = following
-    return y
 
 
 @inline

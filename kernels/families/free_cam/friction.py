@@ -14,7 +14,6 @@ from kernels import status as st
 from kernels.curves.root_search import false_position
 from kernels.families.free_cam.contact import (
     FINEST,
-    HALVINGS,
     Cam,
     least_distances,
     reach,
@@ -29,6 +28,7 @@ from kernels.types import Array, Status
 
 # Distance within which limit points are searched, in units of the distance within which all extrema lie.
 FAR = 64.0
+HALVINGS = 60
 
 
 # Ratio of the tensions T2/T1 = ratio e^(along wrap), sine of the angle of friction across the thread.

@@ -8,8 +8,10 @@ import numpy as np
 
 from kernels import status as st
 from kernels.curves.polynomials import roots_up_to, value_and_slope
+from kernels.curves.root_search import newton_root
 from kernels.families.geared_dwell.motion import Reduced, pin, reduce_design, velocity
 from kernels.jit import inline, kernel
+from kernels.linkage.outputs import write_number
 from kernels.types import Array, Status
 
 
@@ -92,12 +94,6 @@ def _speed_at(r: Reduced, number: int, tau: float, d: Array, lean: Array) -> flo
     return abs(1.0 - (lean[0] + lean[1] * tau) / square)  # type: ignore[no-any-return]
 
 
-@inline
-def _put(out: Array | None, i: int, value: float) -> None:
-    if out is not None:
-        out[i] = value
-
-
 @kernel
 def turn_maxima(
     designs: Array,
@@ -158,42 +154,27 @@ def turn_maxima(
                     for n in range(-2, count):
                         tau = found[n] if n >= 0 else (0.0 if n == -1 else end)
                         square = quadratic(d, tau)
-                        value = abs(value_and_slope(bend, 5, tau)[0]) * steep / square / square / square
+                        value = abs(value_and_slope(tau, bend, 5)[0]) * steep / square / square / square
                         m3 = value if not value <= m3 else m3
         if m1 != m1 or m2 != m2 or m3 != m3:
             code = st.NOT_CONVERGED
         status[i] = code
         scale = 2.0 * abs(total) if code == st.OK else math.nan
         valid = 1.0 if code == st.OK else math.nan
-        _put(max_abs_dpsi, i, valid * m1)
-        _put(max_abs_d2psi, i, scale * m2)
-        _put(phi_max_abs_d2psi, i, valid * phi2)
-        _put(max_abs_d3psi, i, scale * m3)
+        write_number(max_abs_dpsi, i, valid * m1)
+        write_number(max_abs_d2psi, i, scale * m2)
+        write_number(phi_max_abs_d2psi, i, valid * phi2)
+        write_number(max_abs_d3psi, i, scale * m3)
 
 
 @inline
-def rising_angle(r: Reduced, psi: float, extreme: float) -> float:
-    """Find the phi at which psi, rising from its extreme to pi at phi = pi, takes a value; nan without convergence."""
-    low, high = extreme, math.pi
-    phi, before = min(2.0 * extreme, 0.5 * (low + high)), math.inf  # twice the extreme is the root for k -> 1
-    for _ in range(100):
-        u, v = math.cos(phi), math.sin(phi)
-        h = r.front if u > 0.0 else r.back
-        t = v * v / (1.0 + h.sign * u)
-        x, y, _ = pin(h, t, h.sign * v)
-        excess = math.atan2(h.sign * y, h.sign * x) - psi
-        if excess < 0.0:
-            low = phi
-        else:
-            high = phi
-        # Newton's step, or bisection where it leaves the bracket or does not halve what is left.
-        following = phi - excess / velocity(h, r.ak4, t, x * x + y * y)
-        if not (low < following < high) or abs(excess) > 0.5 * before:
-            following = 0.5 * (low + high)
-        if abs(following - phi) <= 2.0**-51 * phi or not (low < following < high):
-            return following
-        phi, before = following, abs(excess)
-    return math.nan
+def _excess(phi: float, r: Reduced, psi: float) -> tuple[float, float]:
+    """Angle psi at phi > 0 less a given one, and its slope."""
+    u, v = math.cos(phi), math.sin(phi)
+    h = r.front if u > 0.0 else r.back
+    t = v * v / (1.0 + h.sign * u)
+    x, y, _ = pin(h, t, h.sign * v)
+    return math.atan2(h.sign * y, h.sign * x) - psi, velocity(h, r.ak4, t, x * x + y * y)
 
 
 @kernel
@@ -226,8 +207,7 @@ def dwell_measures(
             code = st.INVALID_INPUT
         elif not r.regular:
             code = st.SINGULAR
-        if turns is not None:
-            turns[i] = r.turns if code == st.OK else math.nan
+        write_number(turns, i, r.turns if code == st.OK else math.nan)
         if dwell_angle is not None or dwell_deviation is not None or dwell_band is not None:
             code = st.NO_DWELL if code == st.OK and r.turns != 1.0 else code
         returns = code == st.OK and k > 1.0
@@ -242,10 +222,12 @@ def dwell_measures(
                 x, y, _ = pin(h, t, math.sqrt(t * (2.0 - t)))
                 deviation = -math.atan2(y, x)
                 if dwell_band is not None:
-                    band = 2.0 * rising_angle(r, deviation, 2.0 * math.asin(math.sqrt(0.5 * t)))
+                    # psi rises from its extreme to pi at phi = pi; twice the extreme is the root for k -> 1
+                    extreme = 2.0 * math.asin(math.sqrt(0.5 * t))
+                    band = 2.0 * newton_root(
+                        _excess, extreme, math.pi, -1.0, min(2.0 * extreme, 0.5 * (extreme + math.pi)), r, deviation
+                    )
                     code = st.NOT_CONVERGED if band != band else code
-            if dwell_deviation is not None:
-                dwell_deviation[i] = deviation
-            if dwell_band is not None:
-                dwell_band[i] = band
+            write_number(dwell_deviation, i, deviation)
+            write_number(dwell_band, i, band)
         status[i] = code

@@ -12,7 +12,7 @@ from kernels import status as st
 from kernels.arithmetic.complex_step import arctan2, magnitude
 from kernels.arithmetic.intrinsics import largest, smallest
 from kernels.jit import inline, inline_fused, kernel, kernel_fused
-from kernels.linkage.outputs import write
+from kernels.linkage.outputs import write, write_number
 from kernels.types import EPS, TWO_PI, Array, Numbers, Status
 
 TOO_NEAR = 1e-50  # a pin that passes the axis nearer than this has derivatives outside float64
@@ -264,9 +264,6 @@ def dense_maxima(
             code = st.SINGULAR
         status[i] = code
         scale = 2.0 * abs(r.front.total) if code == st.OK else math.nan
-        if max_abs_dpsi is not None:
-            max_abs_dpsi[i] = m1 if code == st.OK else math.nan
-        if max_abs_d2psi is not None:
-            max_abs_d2psi[i] = scale * m2
-        if max_abs_d3psi is not None:
-            max_abs_d3psi[i] = scale * m3
+        write_number(max_abs_dpsi, i, m1 if code == st.OK else math.nan)
+        write_number(max_abs_d2psi, i, scale * m2)
+        write_number(max_abs_d3psi, i, scale * m3)

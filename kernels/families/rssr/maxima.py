@@ -54,7 +54,7 @@ from kernels.families.rssr.sampling import (
     settle,
 )
 from kernels.jit import inline, kernel
-from kernels.linkage.outputs import write
+from kernels.linkage.outputs import write, write_number
 from kernels.types import TWO_PI as TURN
 from kernels.types import Array, CosSin, Status
 
@@ -106,15 +106,9 @@ def _put(i: int, order: int, result: tuple[float, float, float, float], places: 
     write(places.phi, order - 1, i, place - TURN * np.floor(place / TURN))  # math.floor makes an integer; nan has none
     write(places.error, order - 1, i, bound)
     write(places.phi_error, order - 1, i, reach)
-    _put_height(heights.dpsi, i, best)
-    _put_height(heights.d2psi, i, best)
-    _put_height(heights.d3psi, i, best)
-
-
-@inline
-def _put_height(out: Array | None, i: int, value: float) -> None:
-    if out is not None:
-        out[i] = value
+    write_number(heights.dpsi, i, best)
+    write_number(heights.d2psi, i, best)
+    write_number(heights.d3psi, i, best)
 
 
 @inline

@@ -31,7 +31,7 @@ from kernels.families.rssr.closure import (
 )
 from kernels.jit import inline, inline_fused, kernel, kernel_fused
 from kernels.linkage.crank_closure import Reduced, axial_terms, discriminant_tolerance
-from kernels.linkage.outputs import write
+from kernels.linkage.outputs import write, write_number
 from kernels.linkage.verdict import pose_status
 from kernels.types import Array, Numbers, Status
 
@@ -250,12 +250,9 @@ def dense_maxima(
                         if values is not None:
                             values[j] = abs(jerk)
         min_delta[i] = least / (r.coupler * r.coupler) if r.valid else math.nan
-        if max_abs_dpsi is not None:
-            max_abs_dpsi[i] = m1
-        if max_abs_d2psi is not None:
-            max_abs_d2psi[i] = m2
-        if max_abs_d3psi is not None:
-            max_abs_d3psi[i] = m3
+        write_number(max_abs_dpsi, i, m1)
+        write_number(max_abs_d2psi, i, m2)
+        write_number(max_abs_d3psi, i, m3)
         if at is not None and values is not None:
             most = m3 if max_abs_d3psi is not None else (m2 if max_abs_d2psi is not None else m1)
             # The maximum is one of the stored values, so it is found again by equality.
