@@ -13,17 +13,22 @@ from sweep.effects.base import Advice, Effect, PlacedEffect
 from sweep.effects.scene import first_scene
 from sweep.families.base import Angles, Array, Family
 from sweep.families.machines.machine import Machine
+from sweep.families.machines.main_shaft import ShaftTorque
 
 SAMPLES = 64
 
 
 class _Part(NamedTuple):
-    """Family, chain or machine's member with effects, the prefix of its names, and its wanted outputs."""
+    """Family, chain or machine's member with effects, the prefix of its names, and its wanted outputs.
+
+    ``even``: no other member drives it.  ``shared``: a relation torque tells the speed of its shaft.
+    """
 
     before: str
     family: Family
     wanted: frozenset[str]
     even: bool = True
+    shared: bool = False
 
     @property
     def offered(self) -> list[PlacedEffect]:
@@ -36,8 +41,10 @@ def _parts(family: Family, wanted: Iterable[str]) -> list[_Part]:
     if not isinstance(family, Machine):
         return [_Part("", family, frozenset(wanted))]
     asked = asked_of_machine(family, wanted)
+    shared = {one.member for r in family.relations if isinstance(r, ShaftTorque) for one in r.driven}
     return [
-        _Part(f"{m.name}.", m.family, frozenset(map(m.own, asked)) - {""}, m.driver is None) for m in family.members
+        _Part(f"{m.name}.", m.family, frozenset(map(m.own, asked)) - {""}, m.driver is None, m.name in shared)
+        for m in family.members
     ]
 
 
@@ -154,6 +161,8 @@ def _findings(part: _Part, columns: dict[str, Array]) -> list[Finding]:
     for placed in part.offered:
         if any(p.default is None and p.name not in columns for p in needs[placed.name]):
             continue
+        if part.shared and "D4" in placed.entry.key and placed.name not in computed:
+            continue  # the fluctuation of the shaft, with all members and its flywheel
         advice = placed.entry.advice(first_scene(bare, own, angles, given).stage(placed.stage))
         if advice is not None:
             found.append(Finding(placed.name, placed.name in computed, advice))

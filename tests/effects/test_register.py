@@ -140,6 +140,14 @@ def test_effects_of_members_are_told_by_their_names_with_their_shares_of_the_cos
     judged = {one.name: one.wanted for one in findings(bare, full, matrix, ["max_t"])}
     assert judged["y.kinetostatics"] and not judged["z.pressure"]
     assert "z.kinetostatics" not in judged
+    # The speed is that of the shaft with x and y and its flywheel: a member alone would be told a wrong unevenness.
+    assert not any("speed_fluctuation" in name for name in judged)
+    alone = family(sweep.machine({"x": "slider_crank", "y": "rssr"}))
+    full = extended(alone, ["x.max_force_b"])
+    matrix = np.array([[p.default or 0.0 for p in full.parameters]] * 4)
+    for m in full.members:
+        matrix[:, m.columns] = designs(m.family, 4)
+    assert any("speed_fluctuation" in one.name for one in findings(alone, full, matrix, ["x.max_force_b"]))
 
 
 def test_the_finger_says_that_the_coupler_cannot_spin_freely():
