@@ -30,6 +30,7 @@ RIPPLE = 0.25  # error per fourth difference, which is eight times the noise of 
 # them: there a fourth difference may vanish by chance, and halving the window only halves the error.
 BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences relative to the largest, of first and of later samples
 LEARNT = 0.8  # largest share of the previous error that a narrower window about a kink leaves
+LOST = 2.0  # blur, in steps, of a quartic whose bend is below its noise
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # steps of the last windows relative to the samples' spacing
 BESIDE = 1e-3 * np.array([-2.0, -1.0, 1.0, 2.0])  # poses next to a place [rad]: two alike show a dwell
 VARIES = 8.0  # ratio of the rounding at neighbouring poses to that at one pose, at most
@@ -122,6 +123,9 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
         # Too small a window shows only noise: it may refine the height, but must not change the place.
         misplaced = np.where(kink > 0.0, SHRINK_KINKED, 0.0)
         err_place = u * (claim * np.abs(place) + blur + misplaced) + 4.0 * EPS * np.pi
+        # Where noise hides the bend, the peak may lie anywhere about the window, however narrow it is.
+        err_place[inside & (blur >= LOST) & (kink == 0.0)] = np.inf
+        err_place[~inside] = np.maximum(err_place, err_phi[active])[~inside]
         # At a kink the error shrinks with the window.  Noise looks bent too, but its error stays, and it is ignored.
         noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < looked[active])
         looked[active] = np.where(inside, u, looked[active])
@@ -215,11 +219,14 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
         below, here, above = slope(every, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
         bend = (above - below) / (2.0 * step)
         move = -np.divide(here, bend, out=np.full(phi.size, np.inf), where=bend != 0.0)
-        better = np.abs(move) <= step
+        better = np.abs(move) <= np.maximum(step, err_phi)
         phi[better] += move[better]
         # The noise of the derivative determines the last steps; one may be short by chance.
         err_phi[better] = 4.0 * np.maximum(np.abs(move), last)[better] + 8.0 * EPS * np.pi
         last = SHRINK * np.abs(move)
+    # Where rounding has made the place that of another top, the root of the derivative may be far away.
+    far = ~better & np.isfinite(move)
+    err_phi[far] = np.maximum(err_phi, np.minimum(2.0 * np.abs(move), np.pi))[far]
     return phi, err_phi
 
 

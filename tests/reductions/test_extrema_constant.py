@@ -111,6 +111,27 @@ def test_the_place_on_a_constant_may_be_any_angle(accuracy):
     assert (found[[f"err_{name}" for name in names]] == np.pi).all(axis=None)
 
 
+@pytest.mark.parametrize("accuracy", [1e-6, 1e-9, 1e-12])
+def test_places_on_curves_that_hardly_vary_are_within_their_errors(accuracy):
+    """Windows that show noise alone claimed their own width: places erred by 5e-5 rad for errors of 2e-7."""
+    random = np.random.default_rng(3)
+    n, side = 40, np.tile([-1.0, 1.0], 20)
+    e, f, alpha = random.uniform(-3.0, 3.0, n), random.uniform(-3.0, 3.0, n), random.uniform(-3.0, 3.0, n)
+    a, b = 10.0 ** random.uniform(-10.0, -7.0, n), random.uniform(1.2, 3.0, n) * np.hypot(e, f * np.cos(alpha))
+    table = {"a": a, "b": b, "e": e, "f": f, "alpha": alpha, "branch": side}
+    along = ["phi_min_s", "phi_max_s"]  # the slider's travel, whose derivative is an output
+    alone = ["phi_min_y_c", "phi_max_y_c"]  # the same curve without one
+    found = sweep.summarise("rssp", table, along + alone, accuracy=accuracy)
+    assert (found.status == st.OK).all()
+    # ds/a without the terms that have the factor a; they move its zero by 10 a here.
+    root = side * np.sqrt(b**2 - e**2 - (f * np.cos(alpha)) ** 2)
+    exact = np.arctan2(np.cos(alpha) * (1.0 + f * np.sin(alpha) / root), e / root)
+    for name in along + alone:
+        off = np.abs(np.angle(np.exp(2j * (found[name] - exact)))) / 2.0
+        assert (off <= found[f"err_{name}"] + 100.0 * a).all(), name
+    assert (found[[f"err_{name}" for name in along]] < 1e-6).all(axis=None)  # the derivative knows them better
+
+
 @pytest.mark.parametrize("mode", [0, 1, -1])
 def test_a_level_curve_is_halved_once(mode):
     """Polynomials through equal poses are off by their rounding: panels were halved until 48 of them were small."""
