@@ -87,7 +87,8 @@ def _block(
     for request, answer in found.items():
         values = poses[request.pose][good]
         if family.pose_output[request.pose].wraps:
-            values, winds = sampling.unwrapped(row, values)
+            start = sampling.pose_columns(family, designs[rows], np.zeros((rows.size, 1)), [request.pose])[0]
+            values, winds = sampling.unwrapped(row, values, start[request.pose][row, 0])
             status[row[winds]] = st.NOT_OSCILLATING
         panels = fitted(row, low, high, values, request.mode)
         curves = _curves(family, designs[rows], request.pose, status)

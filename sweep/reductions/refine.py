@@ -208,7 +208,7 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
 
     Notes
     -----
-    Secant steps, each as wide as the place is uncertain; one longer than the secant is not taken.  The height of a
+    Secant steps, each as wide as the place is uncertain; one that leads much farther is not taken.  The height of a
     maximum determines its place to the square root of its rounding only, the derivative to its own rounding.
     """
     every = np.arange(phi.size)
@@ -219,12 +219,12 @@ def polish_places(slope: Sampler, phi: Array, err_phi: Array) -> tuple[Array, Ar
         below, here, above = slope(every, phi[:, None] + step[:, None] * np.arange(-1.0, 2.0)).T
         bend = (above - below) / (2.0 * step)
         move = -np.divide(here, bend, out=np.full(phi.size, np.inf), where=bend != 0.0)
-        better = np.abs(move) <= np.maximum(step, err_phi)
+        better = np.abs(move) <= np.maximum(step, VARIES * err_phi)
         phi[better] += move[better]
         # The noise of the derivative determines the last steps; one may be short by chance.
         err_phi[better] = 4.0 * np.maximum(np.abs(move), last)[better] + 8.0 * EPS * np.pi
         last = SHRINK * np.abs(move)
-    # Where rounding has made the place that of another top, the root of the derivative may be far away.
+    # Rounding may have made a top of its own; then the root of the derivative is far away.
     far = ~better & np.isfinite(move)
     err_phi[far] = np.maximum(err_phi, np.minimum(2.0 * np.abs(move), np.pi))[far]
     return phi, err_phi

@@ -77,19 +77,21 @@ def continued(family: Family, name: str, values: Array, middle: Array) -> Array:
     return values + TWO_PI * np.rint((middle - values) / TWO_PI)
 
 
-def unwrapped(row: Indices, values: Array) -> tuple[Array, Mask]:
+def unwrapped(row: Indices, values: Array, start: Array) -> tuple[Array, Mask]:
     """Make angles continuous over the turn, from poses (k, m) on pieces of it in rising order.
 
     Returns
     -------
-    values : continuous from the first piece of each ``row`` (k,) on; as they are where a step may go either way
+    values : continuous from the angle ``start`` (k,) of each ``row`` (k,) at crank angle 0 on; as they are where a step
+        may go either way
     winds : (k,) whether the row's angle makes full turns
     """
     first, last = np.searchsorted(row, row), np.searchsorted(row, row, side="right") - 1
     step = np.diff(values.ravel(), prepend=values[:1, 0]).reshape(values.shape) / TWO_PI
     step[first, 0] = 0.0
     turns = np.cumsum(np.rint(step)).reshape(values.shape)
-    whole = values - TWO_PI * (turns - turns[first, :1])
+    begun = np.rint((start - values[first, 0]) / TWO_PI)[:, None]  # the first pose may lie beyond the cut already
+    whole = values - TWO_PI * (turns - turns[first, :1] - begun)
     clear = np.ones(row.size, np.bool_)
     np.logical_and.at(clear, first, (np.abs(step - np.rint(step)) < UNCLEAR).all(axis=1))
     clear = clear[first]

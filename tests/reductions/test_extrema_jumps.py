@@ -181,6 +181,19 @@ def test_an_angle_beside_a_jump_over_its_cut_converges_as_its_mirror_image_does(
         assert own.max_psi.iloc[i] - own.min_psi.iloc[i] == pytest.approx(np.ptp(psi), abs=1e-4)
 
 
+@pytest.mark.parametrize("gap", [1e-11, 1e-9, 1e-6])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_an_angle_that_leaves_its_cut_at_once_is_continuous_from_the_angle_0_on(side, gap):
+    """psi is pi at phi = 0 and passes its cut there with side -1: extremes were those less a full turn."""
+    e = 1.0 + gap
+    crank = {"a": 1.0, "e": side * e, "branch": side}
+    got = sweep.summarise("inverted_slider_crank", crank, ["max_psi", "min_psi"], accuracy=1e-9).iloc[0]
+    tangent = np.arctan2(1.0, np.sqrt((e - 1.0) * (e + 1.0)))  # asin(a/e), where the slot touches the crank circle
+    assert got.status == st.OK
+    assert abs(got.max_psi - np.pi - tangent) <= got.err_max_psi + 1e-15
+    assert abs(got.min_psi - np.pi + tangent) <= got.err_min_psi + 1e-15
+
+
 BORN_DEAD = (
     0.9651568162379532, 1.9292332440078357, 1.7214334501208706, -0.8645343199626364, -0.42182100618150087,
     -0.36326689004741036, 0.8990315876340816, -0.22168799026252226, 0.14593584177720245, 1.0, 1.0,
