@@ -178,7 +178,8 @@ def window_angle(family: Family, designs: Array, window: Window) -> tuple[Array,
             np.subtract.at(above, (found.side, found.row), np.sign(found.values) * found.phi)
             size = window.err[rows[found.row]] + 8.0 * EPS * np.abs(levels[found.side, found.row])
             np.add.at(own, found.row, size / np.abs(found.values) + 4.0 * EPS * TWO_PI)
-            still = np.ptp(columns[window.position], axis=1) <= window.err[rows]  # in the window all the turn, or never
-            angle[rows], err[rows] = above[0] - above[1], np.where(still, TWO_PI, own)
+            # In the window all the turn, or never: rounding passes the levels any number of times.
+            still = np.ptp(columns[window.position], axis=1) <= window.err[rows]
+            angle[rows], err[rows] = np.where(still, TWO_PI, [above[0] - above[1], own])
             samples[rows], pending[rows] = 2 * count, touching & (count < MOST)
     return angle, err

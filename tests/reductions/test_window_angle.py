@@ -171,6 +171,17 @@ def test_a_follower_that_stands_still_may_be_in_the_window_all_the_turn_or_never
     assert found.err_window_angle == 2.0 * np.pi
 
 
+@pytest.mark.parametrize("part", [(0.5, 0.57), (0.0, 0.2), (0.25, 1.0)])
+def test_rounding_of_a_slider_that_stands_still_passes_no_window(part):
+    """The crank turns about the slider's line, all but 6e-17: window angles were -22 rad to 322 rad."""
+    sliders = {"a": 1.0, "b": [1.42, 1.6925, 1.1947], "e": 0.0, "f": [-2.8346, 0.7617, -1.15],
+               "alpha": [-0.5 * np.pi, -0.5 * np.pi, 0.5 * np.pi], "branch": [-1.0, 1.0, -1.0]}  # fmt: skip
+    found = sweep.summarise("rssp", sliders, ["window_angle"], window=part, accuracy=1e-9)
+    assert (found.window_angle.between(0.0, 2.0 * np.pi) | (found.status != 0)).all()
+    assert ((found.err_window_angle == 2.0 * np.pi) | (found.status != 0)).all()
+    assert (found.status == 0).any()
+
+
 @pytest.mark.parametrize("window", WINDOWS)
 def test_error_is_that_of_exact_ends_at_loose_targets(window):
     """The ends of the stroke were found to the target, which moved a stay next to them by up to fifty times as much."""
