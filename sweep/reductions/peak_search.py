@@ -227,8 +227,7 @@ class PeakSearch:
         bare = np.array([request.pose not in self.family.derivative_of for request in self.requests])[mine.request]
         bare &= located
         locate[bare] = self.target
-        width = np.maximum(peak.step, refine.SHRINK**3 * peak.spacing)
-        peak.err_phi[bare] = np.maximum(peak.err_phi, width)[bare]
+        peak.err_phi[bare] = np.maximum(peak.err_phi, np.maximum(peak.step, refine.SHRINK**3 * peak.spacing))[bare]
         peak = refine.confirmed(sample, peak, tolerance, locate, share[rivals] * np.abs(peak.height))
         # The first stage of a chain gets its exact input angle, later stages a rounded one.
         blurred = self._rounding(turn, mine, self.guards[1:]) * np.abs(peak.height)
