@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from sweep.dataset.files import replacing
 from sweep.dataset.reading import best
@@ -11,9 +12,6 @@ from sweep.dataset.store import load
 from sweep.errors import InputError, extra
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.quantities import quantity
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 MOST_ROWS = 10_000  # designs: a sheet holds 1 048 576, but 100 000 take minutes to write
 
@@ -50,18 +48,11 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
     tables = {name: _headed(data, frame) for name, frame in present.items()}
     tables["definitions"] = _definitions(data, present)
     try:
-        import openpyxl
+        with replacing(target) as partial, pd.ExcelWriter(partial, engine="openpyxl") as book:
+            for name, frame in tables.items():
+                frame.to_excel(book, sheet_name=name, index=False, freeze_panes=(1, 1))
     except ModuleNotFoundError as error:
-        allowed = f"the package openpyxl: {extra('excel')}"
-        raise InputError("format", "xlsx", allowed, "export") from error
-    book = openpyxl.Workbook(write_only=True)
-    for name, frame in tables.items():
-        sheet = book.create_sheet(name)
-        sheet.freeze_panes = "B2"
-        for row in [list(frame), *frame.astype(object).where(frame.notna(), None).to_numpy().tolist()]:
-            sheet.append(row)
-    with replacing(target) as partial:
-        book.save(partial)
+        raise InputError("format", "xlsx", f"the package openpyxl: {extra('excel')}", "export") from error
     return target
 
 
@@ -87,8 +78,6 @@ def _headed(data: Dataset, frame: pd.DataFrame) -> pd.DataFrame:
 
 def _definitions(data: Dataset, sheets: dict[str, pd.DataFrame]) -> pd.DataFrame:
     """Return definition and unit of every column of the sheets."""
-    import pandas as pd
-
     names = list(dict.fromkeys(str(name) for frame in sheets.values() for name in frame))
     numbers = {str(name) for frame in sheets.values() for name in frame.select_dtypes("number")}
     units = {name: quantity(name, data.units[name]).unit for name in numbers if data.units.get(name)}

@@ -30,42 +30,12 @@ from sweep.report.quantities import LENGTHS, quantity
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 
 TURN = 360.0
 BAR, THIN = 0.5, 0.16  # heights of strokes and dwells, relative to a row
 FILLS = {"rises": OPTIMUM, "falls": "#a9c1df", "flies": "none", "low": QUIET, "high": QUIET}
 KEY = {"rises": "rising stroke", "falls": "falling stroke", "flies": "flight of the foot"}
-
-
-def cyclogram_figure(rows: pd.DataFrame, made: Mapping[str, tuple[float, float]]) -> Figure:
-    """Draw a cyclogram over one turn: rising strokes dark, falling ones light, flights hatched, dwells beneath.
-
-    Events are lines; a band around one is the interval [deg] of manufactured mechanisms' events, from ``made``.
-    """
-    members = list(dict.fromkeys(rows["member"][rows["kind"] != "event"]))
-    events = rows[rows["kind"] == "event"]
-    figure = new_figure(WIDTH, 0.62 * len(members) + 1.3 + 0.14 * len(events))
-    axes = figure.subplots()
-    spans: Any = zip(*(rows[column] for column in ("member", "kind", "name", "start", "end")), strict=True)
-    for member, kind, name, begin, end in spans:
-        if kind == "event":
-            continue
-        height = len(members) - 1 - members.index(member)
-        start, length = math.degrees(begin), math.degrees(end - begin) % TURN
-        bottom, high = (height - 0.5 * BAR - THIN - 0.04, THIN) if kind == "dwell" else (height - 0.5 * BAR, BAR)
-        pieces = [(start, min(length, TURN - start)), (0.0, max(start + length - TURN, 0.0))]
-        bars = axes.broken_barh(pieces, (bottom, high), facecolor=FILLS[name], linewidth=0, zorder=2)
-        bars.set(edgecolor=LIMIT, hatch="/////" if kind == "flight" else None, label=KEY.get(name, "dwell"))
-    _events(axes, events, len(members), made)
-    axes.set_yticks(range(len(members)), members[::-1])
-    axes.set_ylim(-0.6, len(members) - 0.3 + 0.34 * len(events))
-    crank_axis(axes, "angle of the main shaft [°]")
-    handles, labels = axes.get_legend_handles_labels()
-    once = dict(zip(labels, handles, strict=True))
-    figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=len(once))
-    return figure
 
 
 def _events(axes: Axes, events: pd.DataFrame, rows: int, made: Mapping[str, tuple[float, float]]) -> None:
@@ -221,7 +191,28 @@ def cyclogram(
     """
     rows = table(mechanism, design, dwell=dwell, angles=angles)
     with house_style():
-        return cyclogram_figure(rows, made or {}).axes[0]
+        members = list(dict.fromkeys(rows["member"][rows["kind"] != "event"]))
+        events = rows[rows["kind"] == "event"]
+        figure = new_figure(WIDTH, 0.62 * len(members) + 1.3 + 0.14 * len(events))
+        axes = figure.subplots()
+        spans: Any = zip(*(rows[column] for column in ("member", "kind", "name", "start", "end")), strict=True)
+        for member, kind, name, begin, end in spans:
+            if kind == "event":
+                continue
+            height = len(members) - 1 - members.index(member)
+            start, length = math.degrees(begin), math.degrees(end - begin) % TURN
+            bottom, high = (height - 0.5 * BAR - THIN - 0.04, THIN) if kind == "dwell" else (height - 0.5 * BAR, BAR)
+            pieces = [(start, min(length, TURN - start)), (0.0, max(start + length - TURN, 0.0))]
+            bars = axes.broken_barh(pieces, (bottom, high), facecolor=FILLS[name], linewidth=0, zorder=2)
+            bars.set(edgecolor=LIMIT, hatch="/////" if kind == "flight" else None, label=KEY.get(name, "dwell"))
+        _events(axes, events, len(members), made or {})
+        axes.set_yticks(range(len(members)), members[::-1])
+        axes.set_ylim(-0.6, len(members) - 0.3 + 0.34 * len(events))
+        crank_axis(axes, "angle of the main shaft [°]")
+        handles, labels = axes.get_legend_handles_labels()
+        once = dict(zip(labels, handles, strict=True))
+        figure.legend(once.values(), once.keys(), loc="outside lower center", ncols=len(once))
+        return axes
 
 
 def mechanism(
@@ -309,11 +300,9 @@ def polar_load(
     'force at A [N], marks: crank angle'
     """
     design = in_radians(find_family(mechanism), design, angles)
-    selected = [
-        part
-        for part in parts(mechanism, _plain(mechanism, design), 0.0)
-        if part.member == member and part.stage == stage
-    ]
+    names = find_family(mechanism).parameter_names  # parts have no use for masses and speed
+    own = {str(key): values for key, values in design.items() if str(key) in names}
+    selected = [part for part in parts(mechanism, own, 0.0) if part.member == member and part.stage == stage]
     axes_here = [name for part in selected for name, kind in part.kinds.items() if kind == "axis"]
     if joint not in axes_here:
         allowed = f"a joint with an axis: {', '.join(axes_here) or 'none here; name member and stage'}"
@@ -323,9 +312,9 @@ def polar_load(
     first = first - (first @ axis) * axis
     first /= np.linalg.norm(first)
     prefix = f"{member}." if member else ""
-    names = [f"{prefix}force_{joint}_{letter}{stage}" for letter in "xyz"]
+    forces = [f"{prefix}force_{joint}_{letter}{stage}" for letter in "xyz"]
     phi = np.arange(POSES) * (2.0 * math.pi / POSES)
-    force = evaluate(mechanism, design, names, phi=phi, angles="rad")[names].to_numpy(np.float64)
+    force = evaluate(mechanism, design, forces, phi=phi, angles="rad")[forces].to_numpy(np.float64)
     along, across = force @ first, force @ np.cross(axis, first)
     with house_style():
         figure = new_figure(5.0, 5.0)
@@ -337,9 +326,3 @@ def polar_load(
             axes.plot(angle[k], size[k], "o", color=OPTIMUM, markersize=3)
         axes.set_title(f"force at {shown_name(joint)} [N], marks: crank angle")
     return axes
-
-
-def _plain(mechanism: Mechanism, design: Table) -> dict[str, Any]:
-    """Return the columns that are parameters of the mechanism itself."""
-    names = find_family(mechanism).parameter_names
-    return {str(key): values for key, values in design.items() if str(key) in names}
