@@ -92,11 +92,8 @@ def fit_line(
     fitted_columns = np.array([column[f"{name}{suffix}"] for name in guided.fitted])
     scaled = np.array([column[f"{name}{suffix}"] for name in guided.scaled])
     limits = np.array(window or (0.0, 1.0), dtype=np.float64)
-    links, values, travel = (
-        designs[np.ix_(alive, link_columns)],
-        np.empty((len(guided.fitted), alive.size)),
-        np.empty(alive.size),
-    )
+    links = designs[np.ix_(alive, link_columns)]
+    values, travel = np.empty((len(guided.fitted), alive.size)), np.empty(alive.size)
     rows = max(1, BLOCK // chebyshev.size)
     for begin in range(0, alive.size, rows):
         part = slice(begin, begin + rows)
@@ -116,10 +113,8 @@ def _fitted(
     names = ("x_b", "y_b", "x_c", "y_c")
     pins = guide.poses(links, Angles.of(angles), frozenset(names))
     xy = floats(pins, *names)
-    missing = pins["status"] != codes.OK
-    if missing.any():
-        for column in xy:
-            column[missing] = np.nan
+    for column in xy:
+        column[pins["status"] != codes.OK] = np.nan
     values = np.array([links[:, guide.parameter_names.index(name)] for name in guided.fitted])
     along, across, direction, offset = values
     deviation, travel = np.empty(len(links)), np.empty(len(links))

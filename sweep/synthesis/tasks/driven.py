@@ -50,10 +50,8 @@ def slot(a2: Array, e2: Array, t: Array) -> Slot:
     Equation (17) of docs/tasks.md, which is the fork slot of docs/slotted.md.  ``a2``, ``e2`` : (n,), their signs are
     equal and without effect; ``t`` : (n, m).
     """
-    places = {name: np.abs(values) for name, values in (("a", a2), ("e", e2))}
-    matrix = np.array([[p.default or 0.0 for p in slotted.PARAMETERS]] * len(t))
-    for k, parameter in enumerate(slotted.PARAMETERS):
-        matrix[:, k] = places.get(parameter.name, matrix[:, k])
+    places = {"a": np.abs(a2), "e": np.abs(e2)}
+    matrix = broadcast_columns(*(places.get(p.name, p.default or 0.0) for p in slotted.PARAMETERS))
     columns = slotted.poses(matrix, Angles.of(t), frozenset({"rho", "drho", "d2rho"}))
     return Slot(*floats(columns, "rho", "drho", "d2rho"))
 

@@ -98,8 +98,7 @@ class FourBar:
         """Return pose outputs of stages with a crank of 1, (n, m) each."""
         mechanism = family(self.family)
         columns = {"a": 1.0, "branch": float(branch)} | {self.dimensions[name]: part for name, part in shape.items()}
-        n = len(angles.phi)
-        rows = np.column_stack([np.broadcast_to(columns.get(p.name, 0.0), n) for p in mechanism.parameters])
+        rows = broadcast_columns(*(columns.get(p.name, 0.0) for p in mechanism.parameters))
         return mechanism.values(rows, angles, *wanted)
 
     def over_the_turn(self, drive: Drive, columns: Mapping[str, Number]) -> tuple[Array, Array | None]:
