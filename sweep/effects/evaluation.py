@@ -27,8 +27,6 @@ from sweep.numerics.records import Mask
 BLOCK = 32768
 # Designs per block of an effect that samples the turn itself, with some hundred poses of each.
 TURNS = 32
-# Columns of the joint records (kernels/linkage/joints.py): crank axis u, and direction s of the coupler.
-_CRANK_AXIS, _ALONG_COUPLER = slice(0, 3), slice(6, 9)
 
 
 @dataclass(frozen=True)
@@ -202,9 +200,7 @@ def _finger_sine(added: Added, stage: int, column: int, designs: Array, angles: 
     for rows, poses in blocks((held.size, square.shape[1]), BLOCK):
         some = held[rows]
         part = Angles(*(np.broadcast_to(x, square.shape)[some, poses] for x in angles))
-        per_pose, per_design = added.scene(designs[some], part).stage(stage).records
-        across = np.cross(per_design[:, None, _CRANK_AXIS], per_pose[:, :, _ALONG_COUPLER])
-        square[some, poses] = (across * across).sum(axis=2)
+        square[some, poses] = added.scene(designs[some], part).stage(stage).finger_square
     return square
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -12,18 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kernels import status as st
+from kernels.effects.coupler import DRIVING
 from kernels.linkage.bodies import PER_BODY, PER_LINE, Links
 from kernels.linkage.joints import PER_DESIGN, PER_POSE
 from kernels.types import Status
 from sweep.families.base import Angles, Array, Columns, Family
 from sweep.families.capabilities import JointRecords
 from sweep.families.chain import drive, driving_names
-from sweep.families.curve_features import samples_of_waves
+from sweep.families.curve_features import Singular, measured, samples_of_peaks, samples_of_waves
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import at_stage
 from sweep.numerics.curves import Curve
 from sweep.numerics.records import Indices, Mask
+from sweep.numerics.singularities import Discriminant
 
+# Columns of the joint records (kernels/linkage/joints.py): crank axis u, and direction s of the coupler.
+_CRANK_AXIS, _ALONG_COUPLER = slice(0, 3), slice(6, 9)
 _PER_LINK = (PER_BODY, 3, PER_LINE)
 PART = 4096  # poses of bodies per block where their loads are computed design by design
 
@@ -212,11 +216,39 @@ class Scene:
     def _first(self) -> Scene:
         return self if self.before is None else self.before._first
 
-    @property
+    @cached_property
     def least_samples(self) -> Array:
-        """Least number of even samples that resolves loads and waves, (n,); inf where a tool pierces: a load jumps."""
+        """Least number of even samples that resolves loads, waves and peaks, (n,); inf where a load jumps at a tool."""
         of_loads = max((curve.samples for curve in self.every_curve), default=0.0)
-        return np.where(self.pierces, np.inf, np.maximum(samples_of_waves(self.family, self.designs), of_loads))
+        least = np.maximum(samples_of_waves(self.family, self.designs), of_loads)
+        return np.where(self.pierces, np.inf, np.maximum(least, samples_of_peaks(self._peaks(), len(self.designs))))
+
+    def _peaks(self) -> list[Discriminant]:
+        """Functions near whose zeros a link of this stage or of a later one turns abruptly."""
+
+        def of_family(which: int, known: Singular, rows: Indices, phi: Array) -> Array:
+            posed = self.posed(rows, phi).stage(which)
+            return measured(posed.family, known, posed.designs, posed.angles)
+
+        def of_finger(which: int, rows: Indices, phi: Array) -> Array:
+            posed = self.posed(rows, phi).stage(which)
+            return np.where(posed.inputs["finger"][:, None] == DRIVING, posed.finger_square, 1.0)
+
+        found: list[Discriminant] = []
+        stages = [(self.family, self.inputs), *((driven.family, driven.inputs) for driven in self.after)]
+        for which, (family, inputs) in enumerate(stages):
+            found += [partial(of_family, which, known) for known in family.every(Singular) if known.of is None]
+            if "finger" in inputs and (inputs["finger"] == DRIVING).any():
+                found.append(partial(of_finger, which))
+        return found
+
+    @property
+    def finger_square(self) -> Array:
+        """Squared sine of the angle between coupler and crank axis, (n, m)."""
+        per_pose, per_design = self.records
+        across = np.cross(per_design[:, None, _CRANK_AXIS], per_pose[:, :, _ALONG_COUPLER])
+        found: Array = (across * across).sum(axis=2)
+        return found
 
     def only(self, rows: Indices) -> Scene:
         """Select designs by index; the scene itself if these are all."""

@@ -18,10 +18,12 @@ from sweep.families.base import Angles, Columns, Family, Stage, floats
 from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
 from sweep.numerics.curves import PER_GAP
-from sweep.numerics.records import Mask
+from sweep.numerics.records import Indices, Mask
+from sweep.numerics.singularities import Discriminant, singularities
 
 NARROWEST = 1e-9  # angles [rad] closer than this count as one
 SAMPLES_PER_WAVE = 32.0  # of a mechanism: they resolve its order and the next fifteen multiples
+BROAD = 0.1  # width [rad] of peaks that the coarsest grids of a turn show
 
 T = TypeVar("T")
 Feature = TypeVar("Feature", "Waves", "Switches", "Singular", "Crossing", "Bends")
@@ -162,13 +164,28 @@ def samples_of_waves(family: Family, designs: Array) -> Array:
     return np.where(count > 1.0, SAMPLES_PER_WAVE * count, 0.0)
 
 
+def samples_of_peaks(curves: Sequence[Discriminant], n: int) -> Array:
+    """Return a number of even samples several of which lie in the narrowest peak, (n,); 0 for broad ones.
+
+    ``curves`` are those of `Singular`: a link that turns abruptly has a peak of kinetic energy there.
+    """
+    width = singularities([partial(_reached, curve) for curve in curves], n).rho.min(axis=1)
+    return np.where(width < BROAD, PER_GAP * TWO_PI / width, 0.0)
+
+
 def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> Array:
-    """Return a number of even samples that resolves waves and gaps between known angles, (n,); inf with a jump."""
+    """Return a number of even samples that resolves waves, peaks and gaps between angles, (n,); inf with a jump."""
     angles = np.sort(switches(family, designs, outputs), axis=1)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + TWO_PI], axis=1), axis=1)
     narrowest = np.where(gaps > NARROWEST, gaps, TWO_PI).min(axis=1, initial=TWO_PI)
     least = PER_GAP * np.maximum(TWO_PI / narrowest, waves(family, designs, outputs))
     least = np.maximum(least, samples_of_waves(family, designs))
+
+    def peak(known: Singular, rows: Indices, phi: Array) -> Array:
+        return measured(family, known, designs[rows], Angles.of(phi))
+
+    peaks = [partial(peak, known) for known in about(family, Singular, outputs)]
+    least = np.maximum(least, samples_of_peaks(peaks, len(designs)))
     return np.where(crossed(family, designs, outputs), np.inf, least)
 
 
@@ -180,7 +197,7 @@ def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[Singul
     every: dict[Singular, SingularCurve] = family.derived.setdefault(singular_curves, {})
 
     def curve_of(known: Singular) -> SingularCurve:
-        return every.setdefault(known, partial(_measured, family, known))
+        return every.setdefault(known, partial(measured, family, known))
 
     found = [curve_of(known) for known in about(family, Singular, outputs)]
     discriminants = [loop.discriminant for loop in family.every(Assembly)]
@@ -191,8 +208,15 @@ def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[Singul
 
 
 def _where_reached(curve: SingularCurve, designs: Array, angles: Angles) -> Array:
+    return _present(curve(designs, angles))
+
+
+def _reached(curve: Discriminant, rows: Indices, phi: Array) -> Array:
+    return _present(curve(rows, phi))
+
+
+def _present(values: Array) -> Array:
     """Values of a curve, 1 for designs whose links do not reach at one of the angles."""
-    values = curve(designs, angles)
     return np.where(np.isnan(values).any(axis=1, keepdims=True), 1.0, values)
 
 
@@ -202,7 +226,8 @@ def _only(designs: Array, angles: Angles, found: Columns) -> Array:
     return value
 
 
-def _measured(family: Family, known: Singular, designs: Array, angles: Angles) -> Array:
+def measured(family: Family, known: Singular, designs: Array, angles: Angles) -> Array:
+    """Values of a singular's curve, (n, m)."""
     found = family.poses(designs, angles, frozenset(known.needs)) if known.needs else {}
     return known.curve(designs, angles, {name: found[name] for name in known.needs})
 
