@@ -1,4 +1,4 @@
-"""The register of mechanism families: a new family is one folder of kernels, one entry file, and its name below."""
+"""The register of mechanism families: a new one is a folder of kernels, an entry file and a table in families.toml."""
 
 from __future__ import annotations
 
@@ -15,39 +15,9 @@ from sweep.families.check import check_family
 from sweep.families.machines.machine import Machine
 from sweep.families.machines.specification import Specification, built
 from sweep.families.machines.specification import specification as specified
+from sweep.families.register import REGISTER
 
-# Where the entry of each family stands: the file, and the name there.
-_ENTRIES = {
-    "rssr": "rssr.FAMILY",
-    "rssp": "rssp.FAMILY",
-    "guide": "guide.FAMILY",
-    "geared_dwell": "geared_dwell.FAMILY",
-    "five_link": "five_link.FAMILY",
-    "kim_dison": "kim_dison.FAMILY",
-    "slotted": "slotted.FAMILY",
-    "swivel": "slotted.SWIVEL",
-    "spherical_looper": "spherical_looper.FAMILY",
-    "cylindrical_looper": "cylindrical_looper.FAMILY",
-    "slider_crank": "rssp.PLANAR",
-    "four_bar": "four_bar.FAMILY",
-    "inverted_slider_crank": "slotted.PLANAR",
-    "epicyclic_dwell": "geared_dwell.EPICYCLIC",
-    "cam": "cam.FAMILY",
-    "cam_lever": "cam.LEVER",
-    "eyelet": "eyelet.FAMILY",
-    "guided_cam": "guided_cam.FAMILY",
-    "free_cam": "free_cam.FAMILY",
-    "free_cam_friction": "free_cam.WITH_FRICTION",
-    "heddle": "heddle.FAMILY",
-    "backrest": "backrest.FAMILY",
-    "backrest_tension": "backrest.TENSION",
-    "backrest_closure": "backrest.CLOSURE",
-    "feed": "feed.FAMILY",
-    "feed_triad": "feed.TRIAD",
-    "foot": "foot.FAMILY",
-    "feed_foot": "foot.ON_FEED",
-}
-NAMES = tuple(_ENTRIES)
+NAMES = tuple(REGISTER)
 
 Mechanism: TypeAlias = "str | Sequence[str] | Mapping[str, Any] | Specification | Family"
 """A family's name, a list of names for a chain, a table of members for a machine, or a result of `sweep.machine`."""
@@ -141,7 +111,7 @@ def machine(
 def _single(name: str) -> Family:
     if name not in NAMES:
         raise InputError("family", name, f"one of {choices(name, NAMES)}", "family")
-    file, _, attribute = _ENTRIES[name].partition(".")
+    file, _, attribute = REGISTER[name]["entry"].partition(".")
     entry: Family = getattr(import_module(f"sweep.families.{file}"), attribute)
     return check_family(entry)
 

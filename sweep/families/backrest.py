@@ -14,7 +14,7 @@ import numpy as np
 
 from kernels.families import backrest
 from kernels.types import Array, Status
-from sweep.families.base import Angles, Family, Interval, Output, Parameter
+from sweep.families.base import Angles, Family, Interval, Output, Parameter, about
 from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton
 from sweep.families.poses import following, guarded, poses_of
 from sweep.families.skeletons import ORIGIN, moving, parameter, standing
@@ -93,13 +93,6 @@ BAND = (
 
 DRIFT = Output("drift", "N", "K_couple - K0", "(11)")
 PHI = Output("phi", "rad", "bracket angle that solves the equation", "(12)")
-# The worked example of docs/backrest.md
-EXAMPLE = {
-    "a1": 0.75, "b1": 0.5625, "a2": 0.125, "b2": 0.4375, "H": 0.03125, "r": 0.0625, "r0": 0.046875, "psi": 1.5,
-    "xE": 0.0, "yE": 0.25, "f": 0.125, "P1": 300.0, "P2": 200.0, "lM": 0.25, "nu": 1.0, "x3": 0.75, "y3": 0.6875,
-    "cs": 512.0, "l0": 0.5, "F0": 1856.0, "rg": 0.1875, "nug": 0.125, "rho_full": 0.375, "rho_empty": 0.09375,
-}  # fmt: skip
-
 SOUGHT = (
     Parameter("phi_lo", "angle", "bracket angles are sought from here"),
     Parameter("phi_hi", "angle", "bracket angles are sought up to here"),
@@ -222,9 +215,12 @@ def _to_fell(angles: Angles, r: Array, x: Array, y: Array, gamma: Array) -> tupl
 
 
 def _entry(
-    name: str, title: str, parameters: tuple[Parameter, ...], modes: Callable[[Array], np.ndarray],
-    outputs: tuple[Output, ...], position: str, example: dict[str, float],
-) -> Family:  # fmt: skip
+    name: str,
+    parameters: tuple[Parameter, ...],
+    modes: Callable[[Array], np.ndarray],
+    outputs: tuple[Output, ...],
+    position: str,
+) -> Family:
     """Make an entry of the back-rest; its first output is the bracket angle, ``modes`` selects the equation."""
     names = tuple(p.name for p in parameters)
 
@@ -240,13 +236,11 @@ def _entry(
     groups = {"geometry": (outputs[0], *GEOMETRY[1:]), "loads": LOADS, "band": BAND}
     solved = poses_of(kernel, _Blocks, groups, angles="phi")
     return Family(
-        name=name,
-        title=title,
+        **about(name),
         parameters=parameters,
         position=position,
         pose_outputs=outputs,
         poses=guarded(following(solved, {DRIFT.name: (("K_couple",), drift)})),
-        example=EXAMPLE | example,
         domain=beam_of(names),
         points={"axis": ("x_axis", "y_axis", None)},
         capabilities=(skeleton(parameters, outputs[0].name),),
@@ -256,17 +250,12 @@ def _entry(
 _SOLVED = (PHI, *GEOMETRY[1:], *LOADS, *BAND)
 
 FAMILY = _entry(
-    "backrest", "moving back-rest, bracket angle set by the let-off regulator", (*FRAME, *LAW, *BEAM, K0),
-    partial(mode_of, backrest.Mode.LAW), GEOMETRY[:-1] + LOADS + BAND + (DRIFT,), "K_couple",
-    {"phi": 0.4, "turn": -0.15, "K0": 1482.0},
+    "backrest", (*FRAME, *LAW, *BEAM, K0), partial(mode_of, backrest.Mode.LAW),
+    GEOMETRY[:-1] + LOADS + BAND + (DRIFT,), "K_couple",
 )  # fmt: skip
 
 TENSION = _entry(
-    "backrest_tension", "moving back-rest, bracket angle that holds a tension", (*FRAME, *HELD, *SOUGHT, *BEAM),
-    partial(tension_mode, len(FRAME) + 1), _SOLVED, "phi", {"K0": 1482.0, "phi_lo": -0.1, "phi_hi": 1.2},
-)  # fmt: skip
+    "backrest_tension", (*FRAME, *HELD, *SOUGHT, *BEAM), partial(tension_mode, len(FRAME) + 1), _SOLVED, "phi"
+)
 
-CLOSURE = _entry(
-    "backrest_closure", "moving back-rest, closure of the source", (*FRAME, *SOUGHT, *BEAM),
-    partial(mode_of, backrest.Mode.CLOSURE), _SOLVED, "phi", {"phi_lo": -0.5, "phi_hi": 0.6},
-)  # fmt: skip
+CLOSURE = _entry("backrest_closure", (*FRAME, *SOUGHT, *BEAM), partial(mode_of, backrest.Mode.CLOSURE), _SOLVED, "phi")

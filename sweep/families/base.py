@@ -16,6 +16,7 @@ from sweep.families.parameter import PER_RADIAN as PER_RADIAN
 from sweep.families.parameter import Output as Output
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
+from sweep.families.register import about as about
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,6 @@ class March:
 
 
 Domain: TypeAlias = Turn | Interval | March
-
-
 Columns: TypeAlias = dict[str, NDArray[np.generic]]
 
 

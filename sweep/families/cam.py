@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import cam
 from kernels.types import Array
-from sweep.families.base import Angles, Family, Output, Parameter
+from sweep.families.base import Angles, Family, Output, Parameter, about
 from sweep.families.capabilities import Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, kinked, ladders
@@ -85,14 +85,12 @@ def follower_line(designs: Array) -> tuple[Array, Array]:
 
 
 FAMILY = Family(
-    name="cam",
-    title="cam with a sliding roller follower",
+    **about("cam"),
     parameters=PARAMETERS,
     position="s",
     pose_outputs=kinked(PROFILE_OUTPUTS + ROLLER_OUTPUTS),  # the phases of a cam meet in kinks or jumps
     poses=poses,
     uses_phi=True,
-    example={"lift": 1.0, "r0": 3.0, "e": 0.4, "law": 2.0},
     derivative_of=ladders("s"),
     points={"r": ("x_r", "y_r", None)},
     capabilities=(
@@ -131,14 +129,12 @@ def roller(angles: Angles, e: Array, c: Array, psi: Array) -> tuple[Array, Array
 
 
 LEVER = Family(
-    name="cam_lever",
-    title="cam with a roller on a swinging lever",
+    **about("cam_lever"),
     parameters=LEVER_PARAMETERS,
     position="psi",
     pose_outputs=kinked(LEVER_OUTPUTS),
     poses=lever_poses,
     uses_phi=True,
-    example={"lift": 0.4, "r0": 3.0, "c": 5.0, "e": 6.0, "branch": -1.0},
     derivative_of=ladders("psi"),
     capabilities=(
         Switches(phase_ends),

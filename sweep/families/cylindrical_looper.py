@@ -10,7 +10,7 @@ from kernels.families import cylindrical_looper
 from kernels.families.cylindrical_looper.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
 from sweep.families.capabilities import Assembly, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
@@ -134,19 +134,13 @@ LINKS = LinkTree(
 )  # fmt: skip
 
 FAMILY = Family(
-    name="cylindrical_looper",
-    title="looper on a cylinder",
+    **about("cylindrical_looper"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
     poses=poses,
     derivative_of=ladders("psi", "s", "x_p", "y_p", "z_p"),
     outward="branch1",
-    example={
-        "a1": 1.0, "b1": 4.2, "c1": 2.5, "e1": 3.5, "f1": 0.5, "g1": -0.3, "alpha1": 1.0,
-        "a2": 0.5, "b2": 3.0, "e2": 0.3, "f2": 0.1, "alpha2": 0.2, "offset2": 0.5, "slides": 1.0,
-        "p0x": 2.0, "p0y": 0.3, "p0z": 3.0,
-    },
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "p")},
     capabilities=(
         Dimensions(links("a1 b1 c1 a2 b2")),

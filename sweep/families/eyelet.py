@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels.families import eyelet
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
 from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.outputs import ladders
@@ -67,14 +67,12 @@ def thread_squared(number: int, designs: Array, angles: Angles, found: Columns) 
 
 
 FAMILY = Family(
-    name="eyelet",
-    title="thread take-up by an eyelet on a crank",
+    **about("eyelet"),
     parameters=PARAMETERS,
     position="P",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
-    example={"a": 2.0, "e": 3.0, "f": 1.0, "alpha": 0.5, "Z1": -3.0, "Z2": 4.0, "P_h": 8.0},
     points={"eyelet": EYELET},
     capabilities=(
         *(Singular(partial(thread_squared, number), EYELET) for number in (1, 2)),

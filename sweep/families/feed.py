@@ -14,11 +14,12 @@ import numpy as np
 from kernels.families import feed
 from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
 from kernels.types import EPS, Array
-from sweep.families.base import PER_RADIAN, Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, floats
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about, floats
 from sweep.families.capabilities import Arm, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
 from sweep.families.outputs import joint_outputs, joint_rate_outputs, ladders
+from sweep.families.parameter import PER_RADIAN
 from sweep.families.poses import chosen, filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
@@ -167,12 +168,6 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
     return chosen(columns | {f"err_{name}": error for name, error in errors.items()}, wanted, status)
 
 
-EXAMPLE = {
-    "h_a": 0.4, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "dh": -0.3, "xE": 5.6, "yE": 0.7, "rE": 0.18, "dE": 0.8,
-    "q": 2.6, "fx": -1.7, "fy": 0.6, "tx": -0.3, "ty": 0.9, "y_plate": 1.5, "h_sigma": -1.0, "bar_branch": -1.0,
-}  # fmt: skip
-
-
 SKELETON = Skeleton(
     {
         "a": crank_axis(PARAMETERS, "h_f", "h_alpha"), "d": standing(PARAMETERS, "h_e"),
@@ -188,14 +183,12 @@ _RACK = ("fx", "fy")
 SIZES = Dimensions((*links("h_a h_b h_c rh q"), _RACK), optional=("rE",), arms=(Arm(("tx", "ty"), _RACK),))
 
 FAMILY = Family(
-    name="feed",
-    title="feed rack on a horizontal and a lift chain",
+    **about("feed"),
     parameters=PARAMETERS,
     position="x_t",
     pose_outputs=POSE_OUTPUTS,
     poses=poses,
     steps=(Step("feeding", FEEDING_OUTPUTS, events, work=Work.LONG),),
-    example=EXAMPLE,
     derivative_of={"psi_plus_dh": "dpsi", "dpsi": "d2psi"} | ladders("chi", "x_t", "y_t", orders=2),
     points={k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")},
     capabilities=(
@@ -290,22 +283,13 @@ def triad_poses(designs: Array, angles: Angles, wanted: frozenset[str]) -> Colum
     return columns
 
 
-TRIAD_EXAMPLE = {
-    "h_a": 0.5, "h_b": 3.4, "h_c": 1.6, "h_e": 3.5, "rh": 1.2, "xE2": 2.0, "yE2": -2.5, "rE2": 0.15, "dE2": 0.3,
-    "xE3": 5.5, "yE3": -2.5, "rE3": 0.15, "dE3": 0.5, "f1x": -1.0, "f1y": -0.5, "f2x": -0.8, "f2y": -0.6, "f3x": 1.2,
-    "f3y": -0.6, "q1": 1.5, "q2": 2.5, "q3": 2.5, "x0": 4.0, "y0": 1.0, "chi0": 0.0, "h_sigma": -1.0,
-}  # fmt: skip
-
-
 TRIAD = Family(
-    name="feed_triad",
-    title="feed rack on three leads",
+    **about("feed_triad"),
     parameters=TRIAD_PARAMETERS,
     position="x_t",
     pose_outputs=TRIAD_OUTPUTS,
     poses=triad_poses,
     uses_phi=True,
-    example=TRIAD_EXAMPLE,
     derivative_of=ladders("x_t", "y_t", "chi", orders=2),
     points={"t": ("x_t", "y_t", None)},
     capabilities=(

@@ -8,7 +8,7 @@ from kernels.families import five_link
 from kernels.families.five_link.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Array, Family, Output, Parameter
+from sweep.families.base import Array, Family, Output, Parameter, about
 from sweep.families.capabilities import Assembly, Link, OutputLink, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
@@ -71,13 +71,11 @@ def _may_stand(designs: Array) -> Array:
 
 
 FAMILY = Family(
-    name="five_link",
-    title="five-link with two revolutes at the crank pin",
+    **about("five_link"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=VALUE_OUTPUTS + PLACE_OUTPUTS,
     poses=poses,
-    example={"a": 1.0, "b": 3.9, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "h": 0.3, "s2": 0.1},
     derivative_of=ladders("psi"),
     outward="branch",
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b", "h", "c")},

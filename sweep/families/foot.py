@@ -13,7 +13,7 @@ from kernels.families import foot
 from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work, floats
+from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work, about, floats
 from sweep.families.capabilities import Fixed, Link, MovingPoint, PresserFoot, Skeleton
 from sweep.families.poses import chosen, equal_steps, guarded
 from sweep.families.skeletons import Y as UPWARDS
@@ -179,12 +179,8 @@ def rack_place(angles: Angles, half: Array, y: Array) -> tuple[Array, Array]:
     return -half * np.cos(angles.phi), y
 
 
-EXAMPLE = {"m": 0.05, "k": 3000.0, "F0": 6.0, "omega": 400.0, "Y": 1.5e-3, "p": 0.5e-3, "X": 1e-3}
-
-
 FAMILY = Family(
-    name="foot",
-    title="presser foot on a harmonic rack",
+    **about("foot"),
     parameters=PARAMETERS,
     position="y_foot",
     pose_outputs=POSE_OUTPUTS,
@@ -194,7 +190,6 @@ FAMILY = Family(
         Step("closed forms", CLOSED_OUTPUTS, closed, work=Work.LONG),
         Step("march", EVENT_OUTPUTS, partial(_events, on_rack), work=Work.LONG),
     ),
-    example=EXAMPLE,
     analytic=False,
     capabilities=(
         PresserFoot(on_rack, NODES, EVENT_OUTPUTS),
@@ -299,12 +294,9 @@ CONTACT_OUTPUTS = (
     Output("F0_min_contact", "N", "least preload that keeps contact at entry and leaving, rigid ground", "(3)"),
 )  # fmt: skip
 
-FEED_EXAMPLE = feed.EXAMPLE | {"m": 0.05, "k": 50.0, "F0": 4.0, "omega": 20.0}
-
 
 ON_FEED = Family(
-    name="feed_foot",
-    title="presser foot on the rack of a feed mechanism",
+    **about("feed_foot"),
     parameters=FEED_PARAMETERS,
     position="y_foot",
     pose_outputs=(*POSE_OUTPUTS, Output("x_rack", "length", "tooth, along the feed", "(11)")),
@@ -315,7 +307,6 @@ ON_FEED = Family(
         Step("contact", CONTACT_OUTPUTS, contact, work=Work.LONG),
         Step("march", EVENT_OUTPUTS, partial(_events, on_feed), work=Work.LONG),
     ),
-    example=FEED_EXAMPLE,
     analytic=False,
     capabilities=(
         feed.SIZES,

@@ -15,7 +15,7 @@ from kernels.types import Array
 from sweep.families import capabilities as can
 from sweep.families import guide
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Columns, Family, Output, PoseFunction
+from sweep.families.base import Angles, Columns, Family, Output, PoseFunction, about
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import following, on_matrix, step_of
@@ -79,13 +79,11 @@ def _both(rocker: PoseFunction, point: PoseFunction) -> PoseFunction:
 
 
 FAMILY = Family(
-    name="four_bar",
-    title="planar four-bar with a coupler point",
+    **about("four_bar"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=ROCKER_OUTPUTS + POINT_OUTPUTS,
     poses=_both(crank_rocker.poses, guide.poses),
-    example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "branch": 1.0},
     steps=tuple(step_of(step, as_crank_rocker) for step in crank_rocker.FAMILY.steps),
     derivative_of=ladders("psi") | ladders("x_m", "y_m", orders=2),
     outward="branch",

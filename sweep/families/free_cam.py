@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels.families import free_cam
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, March, Output, Parameter, floats
+from sweep.families.base import Angles, Columns, Family, March, Output, Parameter, about, floats
 from sweep.families.capabilities import Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Bends
 from sweep.families.outputs import kinked, ladders
@@ -97,14 +97,12 @@ LINKS = (
 EDGE_POINTS = {name: edge_point(share) for name, share in EDGE.items()}
 
 FAMILY = Family(
-    name="free_cam",
-    title="thread take-up by the bare edge of a turning cam, without friction",
+    **about("free_cam"),
     parameters=PARAMETERS,
     position="P",
     pose_outputs=kinked(POSE_OUTPUTS),  # where the thread comes to lie and leaves
     poses=poses,
     derivative_of=ladders("P", orders=2) | {"L": "dP"},
-    example={"a": 0.4, "X1": 0.83, "Y1": -2.08, "Z1": -3.56, "X2": 3.3, "Y2": -0.85, "Z2": 3.7},
     points={"contact": ("X", "Y", None)},
     capabilities=(
         turning_cam(("P",)),
@@ -158,8 +156,7 @@ def contact_place(designs: Array, angles: Angles, found: Columns) -> Array:
 
 
 WITH_FRICTION = Family(
-    name="free_cam_friction",
-    title="thread take-up by the bare edge of a turning cam, with friction",
+    **about("free_cam_friction"),
     parameters=FRICTION_PARAMETERS,
     position="P",
     pose_outputs=FRICTION_OUTPUTS,
@@ -173,5 +170,4 @@ WITH_FRICTION = Family(
             EDGE_POINTS | {"contact": MovingPoint(("y_contact", "contact"), contact_place)},
         ),
     ),
-    example={**FAMILY.example, "mu": 0.3, "tension_ratio": 1.5},
 )

@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.families import epicyclic_dwell, geared_dwell
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about
 from sweep.families.capabilities import Link, OutputLink, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import coordinate_outputs, ladders
@@ -145,8 +145,7 @@ def skeleton(parameters: tuple[Parameter, ...]) -> Skeleton:
 
 
 FAMILY = Family(
-    name="geared_dwell",
-    title="geared dwell drive",
+    **about("geared_dwell"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=POSE_OUTPUTS,
@@ -165,7 +164,6 @@ FAMILY = Family(
         rolling_planet(PARAMETERS),
         skeleton(PARAMETERS),
     ),
-    example={"k": 1.4, "a": 0.3},
 )
 
 
@@ -204,13 +202,11 @@ def planet_turns(designs: Array) -> Array:
 
 
 EPICYCLIC = Family(
-    name="epicyclic_dwell",
-    title="geared dwell drive with a whole gear ratio",
+    **about("epicyclic_dwell"),
     parameters=EPICYCLIC_PARAMETERS,
     position="psi",
     pose_outputs=EPICYCLIC_OUTPUTS,
     poses=epicyclic_poses,
-    example={"k": 1.3, "a": 0.2, "n": 3.0},
     steps=(Step("dwell", EPICYCLIC_DWELL, epicyclic_measures, work=Work.LONG),),
     derivative_of=ladders("psi"),
     points={"b": ("x_b", "y_b", None)},

@@ -13,7 +13,7 @@ from kernels.families import rssr as rssr_kernels
 from kernels.types import Array
 from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import following, poses_of, together
@@ -133,8 +133,7 @@ IN_SERIES = can.InSeries(
 )
 
 FAMILY = Family(
-    name="guide",
-    title="planar four-bar with a guided coupler point",
+    **about("guide"),
     parameters=PARAMETERS,
     position="s",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS + POINT_OUTPUTS,
@@ -165,5 +164,4 @@ FAMILY = Family(
         ),
     ),
     precise_poses=precise_poses,
-    example={"a": 1.0, "b": 3.3, "c": 3.1, "e": 3.0, "xi": 4.2, "eta": 0.8, "lam": 1.1, "h": -0.6, "branch": 1.0},
 )  # fmt: skip

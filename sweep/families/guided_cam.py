@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import guided_cam
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about
 from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
@@ -110,15 +110,13 @@ def guide(side: float) -> Fixed:
 
 
 FAMILY = Family(
-    name="guided_cam",
-    title="thread take-up by a cam with a guided follower",
+    **about("guided_cam"),
     parameters=PARAMETERS,
     position="S",
     pose_outputs=(*VALUE_OUTPUTS, *PROFILE_OUTPUTS, CURVATURE, WRAP),
     poses=poses,
     steps=(Step("cam body", DESIGN_OUTPUTS, size, work=Work.LONG),),
     derivative_of={"P": "dP", "dP": "d2P", "L": "dP", "S": "dS", "dS": "d2S"},
-    example={"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 30.0, "A1": 10.0, "B2": 3.0},
     points={"profile": ("X_P", "Y_P", None)},
     capabilities=(
         Singular.where_small("S"),

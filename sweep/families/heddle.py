@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import heddle
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
 from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, MovingPoint, Skeleton
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.planar_trees import heddle_shaft
@@ -103,17 +103,12 @@ def shaft(designs: Array, angles: Angles, found: Columns) -> Array:
     return shaft_line(designs)[0][:, None, :] + np.stack([0.0 * y, y, 0.0 * y], axis=-1)
 
 
-EXAMPLE = {"O2B": 30.0, "BC": 150.0, "O3C": 70.0, "O2O3": 155.0, "O4E": 138.5, "chi_mid": 1.85}
-
-
 FAMILY = Family(
-    name="heddle",
-    title="lever drive of a heddle shaft",
+    **about("heddle"),
     parameters=PARAMETERS,
     position="y",
     pose_outputs=VALUE_OUTPUTS + PLACE_OUTPUTS,
     poses=poses,
-    example=EXAMPLE,
     derivative_of=ladders("chi", "y"),
     points={"b": ("x_b", "y_b", None), "c": ("x_c", "y_c", None)},
     capabilities=(

@@ -15,7 +15,7 @@ from kernels.families import rssr
 from kernels.types import Array, Status
 from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step
+from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step, about
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import Made, chosen, following, on_matrix, step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
@@ -118,13 +118,11 @@ def swing(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns
 
 
 FAMILY = Family(
-    name="kim_dison",
-    title="spatial crank-rocker of Kim and Dison",
+    **about("kim_dison"),
     parameters=PARAMETERS,
     position="alpha",
     pose_outputs=MOTION_OUTPUTS + OWN_OUTPUTS,
     poses=poses,
-    example={"r": 1.0, "l": 6.0, "h": 3.2, "a": 2.9, "b": 4.0, "branch": -1.0},
     steps=(
         Step("swing", SWING_OUTPUTS, swing),
         *(

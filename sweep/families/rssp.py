@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kernels.families import rssp
 from kernels.types import EPS, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, about
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import Made, chosen, filled_by, following, move_records, poses_of, step_of
@@ -135,8 +135,7 @@ COMPONENTS = {"ds": "x1", "d2s": "x2", "d3s": "x3"}
 
 
 FAMILY = Family(
-    name="rssp",
-    title="spatial slider-crank",
+    **about("rssp"),
     parameters=PARAMETERS,
     position="s",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
@@ -162,7 +161,6 @@ FAMILY = Family(
         ),
     ),
     precise_poses=precise_poses,
-    example={"a": 1.3, "b": 5.2, "e": 0.7, "f": 0.4, "alpha": 0.3, "branch": -1.0},
 )
 
 
@@ -231,13 +229,11 @@ def planar_opening(designs: Array, status: NDArray[np.uint8], distance: Array) -
 
 
 PLANAR = Family(
-    name="slider_crank",
-    title="planar slider-crank",
+    **about("slider_crank"),
     parameters=PLANAR_PARAMETERS,
     position="s",
     pose_outputs=PLANAR_OUTPUTS,
     poses=following(partial(_on_spatial, poses), _MADE),
-    example={"a": 1.0, "b": 3.0, "e": 0.4, "branch": -1.0},
     steps=tuple(_planar_step(step) for step in FAMILY.steps),
     derivative_of=ladders("s"),
     outward="branch",

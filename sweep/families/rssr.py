@@ -11,7 +11,7 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.types import TWO_PI, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import chosen, filled_by, move_records, on_matrix, optional_outputs, poses_of, together
@@ -280,8 +280,7 @@ CURVES = {name: can.FusedOutput(order, can.constant(1.0, 0.0, 0.0)) for order, n
 SERIES = can.InSeries(rssr.FORM, CURVES, {"dpsi": "x1", "d2psi": "x2", "d3psi": "x3"}, rssr.opening)
 
 FAMILY = Family(
-    name="rssr",
-    title="spatial crank-rocker",
+    **about("rssr"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=POSE_OUTPUTS,
@@ -313,5 +312,4 @@ FAMILY = Family(
         ),
     ),
     precise_poses=precise_poses,
-    example={"a": 1.0, "b": 4.1, "c": 3.2, "e": 2.9, "f": 0.6, "g": -0.4, "alpha": 0.7, "branch": -1.0},
 )

@@ -16,7 +16,7 @@ from kernels.families.slotted import links as fill_links
 from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, floats
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, about, floats
 from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
@@ -110,14 +110,12 @@ LINKS = LinkTree(
 )  # fmt: skip
 
 FAMILY = Family(
-    name="slotted",
-    title="spatial slotted link",
+    **about("slotted"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=VALUE_OUTPUTS + JOINT_OUTPUTS,
     poses=poses,
     derivative_of=ladders("psi", "rho"),
-    example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "s": 0.5},
     points={"b": ("x_b", "y_b", "z_b"), "c": ("x_c", "y_c", "z_c")},
     capabilities=(
         Singular(partial(axis_squared, PARAMETERS), ("x_b", "y_b")),
@@ -168,13 +166,11 @@ def slot_foot(angles: Angles, h: Array, e: Array, psi: Array) -> tuple[Array, Ar
 
 
 PLANAR = Family(
-    name="inverted_slider_crank",
-    title="inverted slider-crank",
+    **about("inverted_slider_crank"),
     parameters=PLANAR_PARAMETERS,
     position="psi",
     pose_outputs=PLANAR_VALUES + PLANAR_JOINTS,
     poses=planar_poses,
-    example={"a": 1.0, "e": 2.2, "h": 0.3, "branch": -1.0},
     derivative_of=ladders("psi") | ladders("s", orders=2),
     points={"b": ("x_b", "y_b", None)},
     capabilities=(
@@ -235,14 +231,12 @@ SWIVEL_LINKS = LinkTree(
 )
 
 SWIVEL = Family(
-    name="swivel",
-    title="crank and rod through a swivel block",
+    **about("swivel"),
     parameters=SWIVEL_PARAMETERS,
     position="rho",
     pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
     poses=swivel_poses,
     derivative_of=ladders("rho", "x_p", "y_p", "z_p"),
-    example={"a": 1.0, "e": 2.6, "f": 0.7, "g": -0.4, "alpha": 0.6, "Lw": 5.0},
     points={"b": ("x_b", "y_b", "z_b"), "p": ("x_p", "y_p", "z_p")},
     capabilities=(
         Singular.where_small("rho"),

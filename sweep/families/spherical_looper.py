@@ -10,7 +10,7 @@ from kernels.families import spherical_looper
 from kernels.families.spherical_looper import links as fill_links
 from kernels.linkage.bodies import DRIVEN, TURN
 from kernels.types import Array
-from sweep.families.base import Family, Output, Parameter
+from sweep.families.base import Family, Output, Parameter, about
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
@@ -110,19 +110,13 @@ LINKS = LinkTree(
 )
 
 FAMILY = Family(
-    name="spherical_looper",
-    title="looper on a sphere",
+    **about("spherical_looper"),
     parameters=PARAMETERS,
     position="psi",
     pose_outputs=tuple(chain.from_iterable(_BLOCKS)),
     poses=poses,
     derivative_of=ladders("psi", "chi", "x_p", "y_p", "z_p"),
     outward="branch1",
-    example={
-        "a1": 1.0, "b1": 4.1, "c1": 3.2, "e1": 2.9, "f1": 0.6, "g1": -0.4, "alpha1": 0.7, "branch1": -1.0,
-        "o": 1.5, "delta": 1.2, "gamma": 2.5, "c0x": -1.0, "c0y": 1.4, "c0z": 0.3, "p0x": -3.0, "p0y": 2.0, "p0z": 2.5,
-        "a2": 0.3, "b2": 7.0, "x2": 0.0, "y2": -4.0, "z2": -4.0, "theta2": 1.0, "beta2": 1.57, "offset2": 0.5,
-    },
     points={name: (f"x_{name}", f"y_{name}", f"z_{name}") for name in ("b1", "c1", "b2", "c2", "p")},
     capabilities=(
         Dimensions((*links("a1 b1 c1 a2 b2"), LOOPER), arms=(Arm(("p0x", "p0y", "p0z"), LOOPER),)),
