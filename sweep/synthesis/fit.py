@@ -23,8 +23,8 @@ from sweep.families.chain import Chain, driven_guide
 from sweep.reductions.steps import applying_step
 
 # The deviation is a smooth function of the input: 48 Chebyshev points of a swing usually miss 1e-4 of its extremes,
-# 5e-3 at worst, 256 of a whole turn 4e-4 (48: up to 2e-2): far less than the optimiser changes afterwards.  The end of a
-# window lies between two samples, where the deviation grows fastest: 48 miss 16 to 28 % of it, 256 some 5 %.
+# 5e-3 at worst, 256 of a whole turn 4e-4 (48: up to 2e-2): far less than the optimiser changes afterwards.
+# The end of a window lies between two samples, where the deviation grows fastest: 48 miss 16 to 28 % of it, 256 some 5.
 SWING_SAMPLES, DENSE_SAMPLES = 48, 256
 SWING_ACCURACY = Accuracy(target=1e-6)
 SWING = ("psi_ext", "swing")
