@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -231,7 +232,7 @@ def write_survivors(parts: Sequence[Path], target: Path) -> None:
 
 def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str, Any]:
     """Return the page's data of designs by name: the current one first, then those compared with it."""
-    results = [as_result(data, row) for row in rows]
+    results = [replace(as_result(data, row), computed_reference=rows[0]) for row in rows]
     roles = ["result", *(f"pin pin-{k}" for k in range(1, len(rows)))]
     shown = [Shown(name, role, status_words(row), row) for name, role, row in zip(names, roles, rows, strict=True)]
     outputs, limits = [tables.output_rows(one) for one in results], [tables.limit_states(one) for one in results]
@@ -241,7 +242,8 @@ def judged(data: Dataset, rows: Sequence[Row], names: Sequence[str]) -> dict[str
         "motion": motion and motion | {"ghosts": list(range(1, len(rows)))},
         "outputs": [
             {"name": same[0].name, "symbol": same[0].symbol, "text": same[0].text,
-             "values": [one.value for one in same], "fast": [one.fast for one in same]}
+             "values": [one.value for one in same], "fast": [one.fast for one in same],
+             "changes": ["", *(one.change for one in same[1:])]}
             for same in zip(*outputs, strict=True)
         ],
         "limits": [

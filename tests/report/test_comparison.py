@@ -51,6 +51,9 @@ def test_all_results_are_on_one_page_and_judged_alike(folders):
         assert quantity("max_abs_d2psi", "1").show(float(true.iloc[0, 0])) in page
         assert f"{design['a']:g}" in words
     assert "active" in words or "met" in words
+    long, less = (chosen(folder).design for folder in folders)
+    both = sweep.summarise("four_bar", {n: [long[n], less[n]] for n in long}, ["max_abs_d2psi"])["max_abs_d2psi"]
+    assert f"{100.0 * (1.0 - both[1] / both[0]):.3g} % less" in words and "against long." in words
     short = np.degrees(abs(float(sweep.summarise("four_bar", chosen(folders[1]).design, ["swing"]).iloc[0, 0])))
     assert short < 40.0 and f"missed by {quantity('swing', 'rad').show(np.radians(40.0 - short), 3)}" in words
     assert 'value="1"' in page and "pin-1" in page  # the second one can be chosen, and has its colour
