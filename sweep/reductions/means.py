@@ -15,7 +15,7 @@ from kernels import status as st
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Status
 from sweep.families.base import Accuracy, Array, Columns, Family
-from sweep.families.curve_features import Switches, about, crossed
+from sweep.families.curve_features import NARROWEST, Switches, about, crossed
 from sweep.numerics.events import with_events
 from sweep.numerics.quadrature import integrate
 from sweep.numerics.records import Indices, only
@@ -108,7 +108,9 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
     mean[lost], err[lost] = np.nan, np.nan
     if family.precise_poses is None and alive.size:
         # Badly scaled designs lose digits in every pose: the mean may lose as much as the largest value.
-        err[alive] = np.maximum(err[alive], shaken(family, designs[alive], top[alive], pose))
+        # Beside the top, which may be at a jump: rounding moves the jump, but hardly the mean.
+        beside = top[alive] + (2.0 * NARROWEST if output.kinks or output.jumps else 0.0)
+        err[alive] = np.maximum(err[alive], shaken(family, designs[alive], beside, pose))
     late = np.flatnonzero(status == st.NOT_CONVERGED)
     status[_alone(family, designs, late, pose, top, mean, err)] = st.OK
     return mean, err, status

@@ -23,7 +23,7 @@ from sweep.numerics.records import Indices
 from sweep.quantities.kinds import Request
 from sweep.reductions import sampling
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
-from sweep.reductions.rounding import ALONE, PLACES, order_of, rounding_by_pieces, shaken_anywhere, singular_share
+from sweep.reductions.rounding import ALONE, order_of, rounding_by_pieces, shaken_anywhere, singular_share
 
 VANISHED = 1e-4  # share of the size below which a root counts as a zero: of a cube root of forces of 1e-12
 STEADY = 10.0 * AGAIN  # times EPS of a value: largest error claimed for a curve that is constant but for rounding
@@ -115,8 +115,7 @@ def _block(
             side = np.abs(heights - top.value[:, None]).argmin(axis=1)
             top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
         late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding)))
-        # Not at the place itself: at a pole rounding moves the height by as much as itself.
-        off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late] + np.pi / PLACES, request.pose)
+        off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late], request.pose)
         noise = off >= ALONE * size[top.row[late]]
         top.err[late[noise]] = np.maximum(top.err[late], off)[noise]
         late = late[~noise]

@@ -19,6 +19,7 @@ from sweep.reductions.sampling import blocks, pose_columns
 
 TRIES = 3
 PLACES = 32  # a force along what bears none is exactly 0 at five of six poses
+BETWEEN = 0.618  # share of their spacing by which they stand off a pose, so that no even share of a turn meets a jump
 ALONE = 0.1  # relative change of a curve's highest sample by rounded inputs from which on the curve is only rounding
 FAINT = 1e-10  # ratio of range to size below which the rounding of a signed curve is checked
 CONSTANT = 64.0 * EPS  # relative range below which a curve is constant but for rounding
@@ -125,10 +126,13 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
 
 
 def shaken_anywhere(family: Family, designs: Array, phi: Array, name: str) -> Array:
-    """Return the largest of these changes at PLACES poses of a turn: of a few roundings any one pose may keep all."""
+    """Return the largest of these changes at PLACES poses of a turn: of a few roundings any one pose may keep all.
+
+    None of them is at ``phi``, (n,), itself: beside a jump or a pole rounding moves the height by as much as itself.
+    """
     found = np.empty(len(designs))
     for rows in blocks(np.arange(len(designs)), PLACES * (TRIES + 1)):
-        places = phi[rows, None] + np.arange(PLACES) * (TWO_PI / PLACES)
+        places = phi[rows, None] + (np.arange(PLACES) + BETWEEN) * (TWO_PI / PLACES)
         found[rows] = shaken(family, designs[rows], places, name)
     return found
 

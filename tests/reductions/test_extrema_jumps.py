@@ -73,6 +73,25 @@ def test_the_mean_of_a_curve_with_jumps_is_found_to_its_target():
     np.testing.assert_allclose(smooth["rms_drive_torque"], np.sqrt((values**2).mean(axis=1)), rtol=1e-8)
 
 
+@pytest.mark.parametrize(("law", "square"), [(1.0, 720.0), (2.0, (16.0 * np.pi**3 / (4.0 + np.pi)) ** 2 / 6.0),
+                                             (3.0, 8.0 * np.pi**4)])  # fmt: skip
+@pytest.mark.parametrize("start", [0.0, 0.01, -0.5 * np.pi])
+@pytest.mark.parametrize(("name", "output"), [("cam", "d3s"), ("cam_lever", "d3psi")])
+def test_the_mean_of_a_jerk_that_jumps_at_a_sample_is_that_of_the_law(name, output, start, law, square):
+    """The reference is the integral of the square of docs/cam.md (2)-(4), in closed form.
+
+    Rounding moves a jump that lies at a sample, which is no sign that the whole curve is rounding.  The error has to
+    keep to the target of 1e-8, and the value to its error; 1e-13 is rounding of the reference.
+    """
+    example = {**family(name).example, "law": law, "start": start, "rise": 0.5 * np.pi, "fall": 0.75 * np.pi}
+    found = sweep.summarise(name, example, f"rms_{output}", accuracy=1e-8).iloc[0]
+    phases = example["rise"] ** -5 + example["fall"] ** -5
+    mean = example["lift"] * np.sqrt(square * phases / (2.0 * np.pi))
+    assert found["status"] == st.OK
+    assert found[f"err_rms_{output}"] <= 1e-8 * mean
+    assert abs(found[f"rms_{output}"] - mean) <= found[f"err_rms_{output}"] + 1e-13 * mean
+
+
 def test_without_brackets_a_jump_takes_the_most_samples(monkeypatch):
     """Negative control: the bracketing ends the search early; else panels take over after the most samples."""
     taken, block = [], PeakSearch.block
