@@ -122,4 +122,13 @@ def _root(
     phi = zeros(off, left, right)
     left_over = np.abs(off(np.arange(phi.size), phi))
     rounding = 8.0 * EPS * (np.abs(event.level) + left_over + slope) + shaken(family, designs, phi, event.of)
-    return np.mod(phi, TWO_PI), (left_over + rounding) / np.maximum(slope, 1e-300) + 8.0 * EPS
+    known = left_over + rounding
+    err = known / np.maximum(slope, 1e-300) + 8.0 * EPS
+    # Beside an extremum the curve is flatter than between the samples: it has to leave its rounding on both sides.
+    flat = np.arange(phi.size)
+    while flat.size:
+        before, after = off(flat, phi[flat] - err[flat]), off(flat, phi[flat] + err[flat])
+        leaves = ((before < 0.0) != (after < 0.0)) & (np.minimum(np.abs(before), np.abs(after)) >= 0.5 * known[flat])
+        flat = flat[~leaves & (err[flat] < (right - left)[flat])]
+        err[flat] *= 2.0
+    return np.mod(phi, TWO_PI), err

@@ -92,6 +92,23 @@ def test_passage_at_the_start_of_the_turn_is_the_first_one() -> None:
     assert found["phi_up"] == 0.0 and found["count_up"] == 2
 
 
+@pytest.mark.parametrize(
+    ("offset", "below"), [(0.0, 1e-6), (0.0, 1e-9), (0.0, 1e-13), (0.0, 3e-15), (0.7, 1e-6), (2.0, 1e-8)]
+)
+def test_error_of_a_passage_just_below_a_top_is_that_of_the_flat_curve_there(offset: float, below: float) -> None:
+    """A pin at r sin(phi + offset); the error was 1e-14 of a slope between samples, that of the angle up to 1e-8."""
+    radius, level = 3.7, 3.7 * (1.0 - below)
+    rises = {"up": {"event": "n.y_b", "level": level}}
+    machine = sweep.machine({"n": {"family": "slider_crank", "offset": offset}}, rises)
+    found = sweep.summarise(machine, {"n.a": radius, "n.b": 9.0}, ["phi_up"], accuracy=1e-8).iloc[0]
+    with mp.workdps(40):
+        true = mp.asin(mp.mpf(level) / mp.mpf(radius)) - mp.mpf(offset)
+        off = float(abs(mp.fmod(mp.mpf(float(found["phi_up"])) - true + mp.pi, 2 * mp.pi) - mp.pi))
+    # The slope there is sqrt(2 below) of the radius.  The error is that of a few roundings of the radius, doubled till
+    # the curve leaves them: at most some 60 units of 2^-53 over the slope.
+    assert off <= found["err_phi_up"] <= 64.0 * 2.0**-53 / np.sqrt(2.0 * below)
+
+
 def test_residence_below_a_level_is_the_timing_of_two_events() -> None:
     machine = sweep.machine(MEMBERS, RELATIONS)
     found = sweep.summarise(machine, TABLE, ["stay", "phi_arrive", "phi_leave"], accuracy=1e-8)
