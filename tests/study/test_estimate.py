@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from sweep.chunks.cascade import ordered_routes
@@ -17,6 +18,7 @@ from sweep.engine.run import run
 from sweep.errors import BudgetError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
+from sweep.optimise.starts.dataset import random_designs
 from sweep.study import Budget, Study, load_study, study_from_data
 from tests.optimise.test_robust import ROBUST
 
@@ -184,7 +186,7 @@ def test_price_of_what_follows_counts_every_search(monkeypatch, jobs):
     assert list(found) == ["search", "tolerances", "what is made", "tables and report"]
     assert found["what is made"] == (7.0 / jobs, 7.0)
     # A population and the searches from two of its ends; those from two designs of the sweep where they are needed.
-    assert found["search"] == pytest.approx((3 * (30.0 + 6.0) / jobs, (40 * (30.0 + 80.0) + 80.0) / jobs))
+    assert found["search"] == pytest.approx((3 * (30.0 + 12.0) / jobs, (40 * (30.0 + 80.0) + 80.0) / jobs))
     whole = (4 * 16.0 + 3 * 40.0 + 3 * 30.0) / jobs
     # Three samples of what is made of each of three ends, and eleven at most.
     few, many = 3 * 3 * 0.5 / jobs, 11 * 3 * 0.5 / jobs
@@ -226,6 +228,24 @@ def test_price_of_searches_that_converge_is_that_of_the_looks_they_take(monkeypa
     assert found["search"] == pytest.approx((3 * 0.025, 3 * looks * 1e-3))
     # Four rounds from each of three starts, and forty from each end at most, of 25 looks of 1 ms.
     assert found["tolerances"] == pytest.approx(((3 * 4 + 3 * 40) * 0.025, 2 * (3 * 4 * 400 + 3 * looks) * 1e-3))
+
+
+def test_a_look_is_timed_where_a_search_would_start(monkeypatch):
+    """A six-bar's search was said to take 14 s and took minutes: the design of the trial did not turn."""
+    tried = []
+
+    def noting(number, problem, start, *given):
+        tried.append(start)
+        return SimpleNamespace(looks=10, ended="looks")
+
+    monkeypatch.setattr("sweep.engine.estimate.search", noting)
+    data = tomllib.loads(TEXT.replace("COUNT", "40").replace("KEEP", "feasible").replace('"10 mm"', '"38 mm"'))
+    data |= {"objective": {"minimise": "max_abs_d2psi"}, "optimise": {"starts": 2, "seed": 1}}
+    question = study_from_data(data, "study.toml")
+    searches(question, 1, SimpleNamespace(kept=np.empty((0, len(question.family.parameters)))))
+    designs = np.stack([random_designs(question, 1, 1)[0], *tried])
+    turning = design_outputs(question.family, designs, ("rotatable",), question.accuracy)["rotatable"]
+    assert turning.tolist() == [0.0, 1.0, 1.0]  # the first that is drawn would not do
 
 
 def test_a_time_is_written_out() -> None:
