@@ -1,4 +1,4 @@
-"""The register of mechanism families: a new one is a folder of kernels, an entry file and a table in families.toml."""
+"""The register of mechanism families: each has kernels, a table in families.toml and an entry."""
 
 from __future__ import annotations
 

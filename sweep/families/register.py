@@ -16,4 +16,4 @@ def about(name: str) -> dict[str, Any]:
     """Return the name, the title and the example of a family in the register, as arguments of `Family`."""
     table = REGISTER[name]
     same = about(table["as"])["example"] if "as" in table else {}
-    return {"name": name, "title": table["title"], "example": same | table["example"]}
+    return {"name": name, "title": table["title"], "example": same | table.get("example", {})}

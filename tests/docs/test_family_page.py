@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 from types import ModuleType
 
@@ -13,7 +14,7 @@ import pytest
 import kernels.families
 import sweep
 from kernels import status as st
-from sweep.families import capabilities, curve_features, link_tree
+from sweep.families import capabilities, curve_features, link_tree, register
 from sweep.families.check import FamilyError, check_family
 
 ROOT = Path(__file__).parents[2]
@@ -23,12 +24,14 @@ PHI = np.linspace(0.0, 6.0, 7)
 
 @pytest.fixture
 def entry(monkeypatch):
-    """Source of the entry, beside the kernel that it imports; from outside of the package, so no cache keeps it."""
+    """Source of the entry, beside its table and its kernel; from outside of the package, so no cache keeps it."""
     source, entry = re.findall(r"```python\n(.*?)```", TEXT, flags=re.DOTALL)
     module = ModuleType("yoke_of_the_page")
     monkeypatch.setitem(sys.modules, module.__name__, module)
     monkeypatch.setattr(kernels.families, "yoke", module, raising=False)
     exec(compile(source, "/yoke_of_the_page.py", "exec"), vars(module))
+    (table,) = re.findall(r"```toml\n(.*?)```", TEXT, flags=re.DOTALL)
+    monkeypatch.setattr(register, "REGISTER", register.REGISTER | tomllib.loads(table))
     return entry
 
 
@@ -53,9 +56,10 @@ def test_family_of_the_page_keeps_every_rule_and_answers(entry):
     np.testing.assert_allclose(np.hypot(joints.loc["b", "x"], joints.loc["b", "y"]), 20.0, rtol=1e-15)
 
 
-def test_what_the_entry_lacks_is_said_at_once(entry):
+def test_what_the_entry_lacks_is_said_at_once(entry, monkeypatch):
+    monkeypatch.delitem(register.REGISTER["yoke"], "example")
     with pytest.raises(FamilyError) as said:
-        made(entry.replace('example={"a": 20.0}', "example={}").replace("orders=2", "orders=1"))
+        made(entry.replace("orders=2", "orders=1"))
     for words in ("family yoke: 2 faults", "example lacks 'a'", "derivative_of has 1 orders of 's': name 2"):
         assert words in str(said.value)
 
