@@ -21,6 +21,7 @@ from sweep.families import NAMES as FAMILIES
 from sweep.families import family
 from sweep.families.capabilities import JointRecords, ThreadPath
 from sweep.families.link_tree import LinkTree
+from sweep.families.parameter import is_known
 from sweep.quantities.units import factor, internal_unit
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -63,6 +64,7 @@ def test_an_entry_is_complete(name):
     outputs = PlacedEffect(entry).outputs
     for o in outputs:
         assert o.text and o.equation, o.name
+        assert is_known(o.unit), o.name  # an unknown word would be printed as a pure number
     for item in (*outputs, *entry.inputs):
         assert factor(internal_unit(item.unit), internal_unit(item.unit)) == 1.0
     for needed in entry.needs:
