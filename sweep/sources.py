@@ -13,5 +13,6 @@ _ROOT = Path(__file__).resolve().parent
 
 DIGESTS: dict[str, str] = {
     path.relative_to(_ROOT).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
-    for path in sorted([*_ROOT.rglob("*.py"), *_ROOT.rglob("*.txt")])  # a table in a text file makes values too
+    # a table in a text file makes values too, and the registers name what computes them
+    for path in sorted([*_ROOT.rglob("*.py"), *_ROOT.rglob("*.txt"), _ROOT / "families.toml", _ROOT / "effects.toml"])
 }

@@ -309,7 +309,7 @@ def code_hash() -> str:
     """Hash the sources and libraries that determine the values in a chunk."""
     import scipy
 
-    values = [path for path in DIGESTS if path.split("/")[0] in VALUES]
+    values = [path for path in DIGESTS if path.split("/")[0].removesuffix(".toml") in VALUES]
     return _hash_sources(values, f"{source_hash()} {np.__version__} {scipy.__version__}")
 
 
