@@ -202,3 +202,9 @@ def test_units_of_all_outputs_are_converted_in_studies_and_named_in_results(name
 def test_a_capability_that_a_family_lacks_is_named():
     with pytest.raises(TypeError, match="guide has no PresserFoot"):
         family("guide").the(PresserFoot)
+
+
+def test_a_machine_is_shown_by_its_name():
+    """At the end of a cell of a notebook it printed all its parts, three million letters."""
+    shown = repr(sweep.machine({"needle": ["rssr", "guide"], "looper": "rssr"}))
+    assert shown == "Machine('machine (needle: rssr+guide, looper: rssr)')"

@@ -45,6 +45,9 @@ class Machine(Family):
     relations: tuple[Relation, ...] = ()
     timings: tuple[Timing | EventValue, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"Machine({self.name!r})"
+
     def member(self, name: str) -> Member:
         """Return the member of a name."""
         return next(m for m in self.members if m.name == name)
