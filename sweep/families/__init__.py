@@ -73,14 +73,11 @@ def machine(
         ``place`` (``at``, ``axis``, ``zero``: origin, z and x of the member's frame, for a chain the last stage's, in
         the machine's frame), ``tip`` (a point fixed to the output link: along it, across it, along its axis) and
         ``eye`` (a point of the coupler)
-    relations : by name, each one of ``{"distance": [point, point]}``, ``{"timing": [crank angle, crank angle]}``,
-        ``{"speed": [point]}`` or of the second of two points relative to the first, ``{"torque": [member, ...]}``,
-        ``{"shaking": [member, ...]}``, ``{"event": pose output, "level": number, "rising": true or false}``,
-        ``{"thread": [point, take-up, ...], "stock": length, ...}`` (docs/thread.md, section 7), ``{"press": member}``
+    relations : by name, such as ``{"distance": [point, point]}``, ``{"speed": [point]}``, ``{"torque": [member, ...]}``
+        or ``{"event": pose output, "level": number, "rising": True}``; docs/machines.md, Relations, lists all of them
     shafts : by name, each ``at``, ``axis``, ``zero`` and, but for ``main``, ``ratio`` and ``phase``; a member then
         names its ``shaft`` with ``sense``, ``shift``, ``turn`` and ``key`` instead of its place (docs/machines.md)
-    tools : by name, each a needle or a blade (docs/stitch.md), for ``{"gap": [body, body]}`` and
-        ``{"take": [needle, blade]}`` among the relations
+    tools : by name, each a needle or a blade (docs/stitch.md), for relations such as ``{"take": [needle, blade]}``
 
     Returns
     -------
