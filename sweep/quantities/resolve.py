@@ -206,6 +206,8 @@ def _margin(family: Family, name: str) -> kinds.Margin | None:
         text = f"stage {stage}: {text}"
     elif len(loops) > 1:
         text = f"{text}; of the stage where it is worst"
+    elif isinstance(family, Chain):
+        text = f"{text}; of stage {loops[0].stage}, the only one with a coupler"
     return kinds.Margin(Output(name, unit, text), base, stage=stage)
 
 

@@ -12,6 +12,7 @@ import sweep
 from kernels import status as st
 from sweep.families import family
 from sweep.families.base import Angles
+from sweep.quantities.resolve import output
 from tests.reference import plain_linkages as naive
 from tests.support.plain_designs import DESIGNS, PHI, evaluated
 
@@ -109,3 +110,17 @@ def test_place_of_the_lever_s_greatest_speed_is_the_middle_of_a_phase_within_its
     assert known.mean() > 0.8  # at 1e-12 rounding is all there is for some
     assert (off[known] <= found["err_phi_max_dpsi"][known]).all()
     assert (found["err_phi_max_dpsi"][known] < 1e-5).all()
+
+
+def test_the_pressure_angle_of_a_cam_in_a_chain_is_that_of_its_stage_and_the_chain_s_says_whose_it_is():
+    """A cam has no coupler: a limit on the chain's own angle does not hold for it, which the definition has to say."""
+    chain = ["rssr", "cam"]
+    example = family(chain).example
+    found = sweep.summarise(chain, example, "max_pressure_angle, max_pressure_angle1, max_pressure_angle2").iloc[0]
+    phi = np.linspace(0.0, 2.0 * np.pi, 2001)
+    dense = sweep.evaluate(chain, example, ["pressure_angle1", "pressure_angle"], phi=phi).max()
+    assert found["max_pressure_angle"] == found["max_pressure_angle1"]
+    # Of 2001 poses the highest is lower than the top by the square of half their distance, times the curvature.
+    assert 0.0 <= found["max_pressure_angle1"] - dense["pressure_angle1"] < 1e-4
+    assert 0.0 <= found["max_pressure_angle2"] - dense["pressure_angle"] < 1e-4
+    assert "stage 1, the only one with a coupler" in output(family(chain), "max_pressure_angle").text
