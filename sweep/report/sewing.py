@@ -61,12 +61,12 @@ def sewn(data: Dataset) -> Sewn | None:
     stated = np.array(sewing.speeds)
     speeds = np.union1d(stated, np.linspace(stated[0], stated[-1], CURVE))
     ends = sewing.ends.values()
-    optimum_rooms, _ = sewing.rooms(study.family, design[None], stated, study.accuracy)
+    optimum_rooms, _, _ = sewing.rooms(study.family, design[None], stated, study.accuracy)
     nominal = {name: room[0] for name, room in optimum_rooms.items()}
     sentence = sewing_sentence({name: room for name, room in nominal.items() if name not in ends}, stated / RPM)
     sentence += f" {window_sentence(*sewing.binding(study.family, design))}"
     windows = np.stack(sewing.window(study.family, design[None], stated), axis=-1)[0]
-    rooms, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
+    rooms, _, _ = sewing.rooms(study.family, designs, speeds, study.accuracy)
     meets = {name: room >= 0.0 for name, room in rooms.items()}
     meets_all = np.logical_and.reduce(list(meets.values()))
     binds = [

@@ -103,8 +103,8 @@ class Sewing(Relation):
 
     def rooms(
         self, machine: Machine, designs: Array, speeds: Array, accuracy: Accuracy
-    ) -> tuple[dict[str, Array], Status]:
-        """Compute the room of each moment at each speed, (n, S) by the name of its relation, and status (n,).
+    ) -> tuple[dict[str, Array], Array, Status]:
+        """Compute the room of each moment at each speed, (n, S) by its relation's name, their error and status (n,).
 
         The room of A is the smallest of the rooms of rise, clearance, scarf and eye; the room of B and C is the margin
         of the triangle; nan without such a moment, negative if the stitch is missed.  ``ends`` are the distances of A's
@@ -120,18 +120,18 @@ class Sewing(Relation):
             each = [self._moments(machine, one, accuracy, status) for one in moved]
             parts = {name: [one[name] for one in each] for name in each[0]}
         rooms = {name: np.stack(values, axis=1) for name, values in parts.items()}
-        rise = rooms.pop("rise")
+        rise, err = rooms.pop("rise"), rooms.pop("err").max(axis=1)
         windows = [self.window(machine, designs, speeds[None, :] * share[:, None]) for share in (slow, fast)]
         rooms[self.ends["above"]] = np.minimum.reduce([rise - low for low, _ in windows])
         rooms[self.ends["below"]] = np.minimum.reduce([high - rise for _, high in windows])
         rooms[self.taking.name] = np.minimum.reduce([rooms[name] for name in (self.taking.name, *self.ends.values())])
-        return rooms, status
+        return rooms, err, status
 
     def step(self, machine: Machine) -> Step:
         """Make the machine's step to the least room of all moments at each speed."""
 
         def run(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-            rooms, status = self.rooms(machine, designs, np.array(self.speeds), accuracy)
+            rooms, known, status = self.rooms(machine, designs, np.array(self.speeds), accuracy)
             least = np.minimum.reduce(list(rooms.values()))
             rooms[""] = least
             status = np.where((status == st.OK) & np.isnan(least).any(axis=1), st.NEVER, status).astype(np.uint8)
@@ -140,13 +140,14 @@ class Sewing(Relation):
             columns: Columns = {}
             for name, (part, k) in self.readings.items():
                 room = rooms[self.ends.get(part, "")][:, k]
-                columns |= {name: room, f"err_{name}": (np.abs(room) + most) * (accuracy.target or 0.0)}
+                err = (np.abs(room) + most) * (accuracy.target or 0.0)
+                columns |= {name: room, f"err_{name}": np.maximum(err, known)}
             return columns | {"status": status}
 
         return Step(f"sewing {self.name}", self.numbers, run, work=Work.LONG, cost=lambda accuracy: 3e6)
 
     def _moments(self, machine: Machine, designs: Array, accuracy: Accuracy, status: Status) -> dict[str, Array]:
-        """Compute rise and room of A without its window, and margins of B and C, (n,); update the status."""
+        """Compute rise and room of A without its window, margins of B and C, and their error, (n,); update status."""
         name, (least, most) = self.taking.name, self.clearance
         names = [f"{name}_{key}" for key in ("rise", "clearance", "above_eye", "below_scarf_end")]
         a = self.taking.step(machine).run(designs, frozenset(names), accuracy)
@@ -160,7 +161,8 @@ class Sewing(Relation):
         for key, part in parts.items():
             lost = (status == st.OK) & np.isnan(found[key])
             status[lost] = part["status"][lost]
-        return found
+        errors = (np.asarray(x, np.float64) for part in parts.values() for k, x in part.items() if k.startswith("err_"))
+        return found | {"err": np.maximum.reduce([0.0 * rise, *errors])}
 
     def _unevenness(self, machine: Machine, designs: Array, accuracy: Accuracy) -> tuple[Array, Array, Status]:
         """Slowest and fastest speed as shares of the mean, (n,), at the speed of the scene, and the status."""

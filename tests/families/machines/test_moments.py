@@ -16,6 +16,7 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.machines.crossings import Poses
 from sweep.families.machines.segments import closest, triple_product
+from tests.families.machines import test_hand_made_stitches as hand_made
 
 TABLE = json.loads((Path(__file__).parents[2] / "oracle" / "machine_open.json").read_text())["rows"]
 FACTOR = 16.0
@@ -195,3 +196,20 @@ def test_gap_of_links_is_the_least_of_dense_samples():
     grid = np.linalg.norm(p + s * (q - p) - a - t * (b - a), axis=3).min(axis=(1, 2)) - 3.0
     assert found["min_free"] <= grid.min() + 1e-9 and found["min_free"] == pytest.approx(grid.min(), abs=0.3)
     assert found["max_free"] == pytest.approx(grid.max(), abs=0.3)
+
+
+@pytest.mark.parametrize("apart", [1e-6, 1e-10])
+def test_room_of_a_passage_that_nearly_touches_is_known_no_better_than_the_rise_there(apart):
+    """Its error was the target of the lengths, 6e-13, where that of the rise is 5e-8."""
+    shift = hand_made.found(hand_made.machine_of(), ["a_reach"])["a_reach"] - apart
+    at, long = hand_made.AT, {"top": -100.0, "scarf_end": -50.0, "eye": 100.0, "point": 200.0}
+    tools = {
+        "seam": {"at": [-30.0, 5.0, 5.0]},
+        "blade": hand_made.BLADE | {"eye": [25.0, 2.0, 0.0], "hold": [20.0, -5.0, 3.0]},
+    }
+    relations = {"a": {"take": ["thin", "blade"], "fields": {"slow": (0.0, 50.0), "fast": (0.0, 50.0)}}}
+    relations |= {"b": {"enter": ["thin", "blade", "seam"]}, "sews": {"sew": ["a", "b"], "speeds": [100.0, 200.0]}}
+    machine = hand_made.machine_of(relations, at=(at[0], at[1] + shift, at[2]), needle=long, tools=tools)
+    names = [output.name for output in machine.relations[-1].numbers]
+    got = sweep.summarise(machine, hand_made.DESIGN, ["a_rise", *names], accuracy=1e-14).iloc[0]
+    assert all(got[f"err_{name}"] >= got["err_a_rise"] > 1e-12 for name in names)
