@@ -72,7 +72,7 @@ def roots_up_to(end: float, p: Array, degree: int, derivatives: Array, found: Ar
             at_high, _ = value_and_slope(high, q, q_degree)
             if (at_low < 0.0) != (at_high < 0.0):
                 # kept <= j: that knot has been read
-                found[kept] = newton_root(value_and_slope, low, high, at_low, middle(low, high), q, q_degree)
+                found[kept] = newton_root(value_and_slope, low, high, at_low, middle(low, high), 0.0, q, q_degree)
                 kept += 1
             low, at_low = high, at_high
         count = kept

@@ -81,12 +81,14 @@ def newton_root(
     high: float,
     at_low: float,
     start: float,
+    finest: float,
     *data: Any,
 ) -> float:
     """Find the zero of a value between places, in any order, where its signs differ; nan without convergence.
 
     Newton's steps from ``start``; the bracket's middle replaces a step that leaves it or does not halve the value.
-    ``at_low`` has the sign of the value at ``low``.
+    ``at_low`` has the sign of the value at ``low``.  The zero is found to its last bits or, next to a place 0, to
+    ``finest``.
     """
     x, before = start, math.inf
     for _ in range(2 * MOST_STEPS):
@@ -100,7 +102,8 @@ def newton_root(
         following = x - value / slope
         if not (low < following < high or high < following < low) or abs(value) > 0.5 * before:
             following = middle(low, high)
-        if abs(following - x) <= 2.0**-51 * abs(x) or not (low < following < high or high < following < low):
+        settled = abs(following - x) <= max(2.0**-51 * abs(x), finest)
+        if settled or not (low < following < high or high < following < low):
             return following
         x, before = following, abs(value)
     return math.nan

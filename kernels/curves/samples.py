@@ -22,8 +22,8 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 FLAT = 1e-9
-GRAVITY = np.ones(256, np.int64)  # by status: the graver one counts for the whole turn
-GRAVITY[[st.OK, st.DEAD_POINT, st.SINGULAR, st.NOT_ASSEMBLED, st.INVALID_INPUT]] = 0, 2, 3, 4, 5
+RANK = np.ones(256, np.int64)  # of a status: the higher one counts for the whole turn
+RANK[[st.OK, st.DEAD_POINT, st.SINGULAR, st.NOT_ASSEMBLED, st.INVALID_INPUT]] = 0, 2, 3, 4, 5
 
 
 @inline
@@ -43,7 +43,7 @@ def worst_status(status: Status, worst: Status) -> None:
     for i in range(status.shape[0]):
         worst[i] = st.OK
         for j in range(status.shape[1]):
-            if GRAVITY[status[i, j]] > GRAVITY[worst[i]]:
+            if RANK[status[i, j]] > RANK[worst[i]]:
                 worst[i] = status[i, j]
 
 

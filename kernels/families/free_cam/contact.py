@@ -156,7 +156,7 @@ def shortest(cam: Cam) -> Contact:
         new = along_edge(cam, following)[1].real
         # only rising zeros are minima; the equality on one side alone counts a zero on a step's end once
         if slope < 0.0 <= new:
-            y = newton_root(_slope, at, following, -1.0, 0.5 * (at + following), cam)
+            y = newton_root(_slope, at, following, -1.0, 0.5 * (at + following), 2.0**-60 * step, cam)
             length = along_edge(cam, y)[0].real
             minima += 1
             if length < best:

@@ -224,9 +224,8 @@ def dwell_measures(
                 if dwell_band is not None:
                     # psi rises from its extreme to pi at phi = pi; twice the extreme is the root for k -> 1
                     extreme = 2.0 * math.asin(math.sqrt(0.5 * t))
-                    band = 2.0 * newton_root(
-                        _excess, extreme, math.pi, -1.0, min(2.0 * extreme, 0.5 * (extreme + math.pi)), r, deviation
-                    )
+                    start = min(2.0 * extreme, 0.5 * (extreme + math.pi))
+                    band = 2.0 * newton_root(_excess, extreme, math.pi, -1.0, start, 0.0, r, deviation)
                     code = st.NOT_CONVERGED if band != band else code
             write_number(dwell_deviation, i, deviation)
             write_number(dwell_band, i, band)

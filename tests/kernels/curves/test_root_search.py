@@ -36,8 +36,8 @@ def kinked(x: float, level: float) -> float:
 
 
 @kernel
-def newton(low: float, high: float, start: float, level: float) -> float:
-    return newton_root(cube_and_slope, low, high, cube(low, level), start, level)
+def newton(low: float, high: float, start: float, finest: float, level: float) -> float:
+    return newton_root(cube_and_slope, low, high, cube(low, level), start, finest, level)
 
 
 @kernel
@@ -70,7 +70,13 @@ def test_newton_s_steps_stay_in_the_bracket(level: float) -> None:
     exact = math.cbrt(level)
     for low, high in ((-20.0, 21.0), (21.0, -20.0), (0.0, math.copysign(20.0, level))):
         for start in (low, high, 0.0):
-            assert newton(low, high, start, level) == pytest.approx(exact, rel=4.0 * 2.0**-53)
+            assert newton(low, high, start, 0.0, level) == pytest.approx(exact, rel=4.0 * 2.0**-53)
+
+
+def test_a_place_next_to_0_is_found_to_what_is_asked() -> None:
+    """Newton's steps to the cube's triple zero shrink by a third each: a last one of 2^-60 leaves twice as much."""
+    assert math.isnan(newton(-1.0, 3.0, 1.0, 0.0, 0.0))
+    assert abs(newton(-1.0, 3.0, 1.0, 2.0**-60, 0.0)) <= 2.01 * 2.0**-60
 
 
 def test_golden_sections_find_a_kink() -> None:
