@@ -210,13 +210,14 @@ def _rises(phi: float, sign: float, curve: Callable[..., tuple[float, float]], d
     return sign * curve(phi, *data)[1] > 0.0
 
 
-@part
+@inline
 def top_at(
     curve: Callable[..., tuple[float, float]], sign: float, samples: Array, j: int, least: float, data: Any
 ) -> tuple[float, float]:
     """Find crank angle and height of the top at sample j of a turn; -inf if there is none above ``least``.
 
-    The samples are those of sign times the curve, of which ``curve(phi, *data)`` gives value and slope.
+    The samples are those of sign times the curve, of which ``curve(phi, *data)`` gives value and slope.  It is folded
+    in: numba keeps no machine code of a kernel that hands a function on to another one.
     """
     n = samples.size
     before, here, after = samples[j - 1], samples[j], samples[(j + 1) % n]
@@ -233,7 +234,7 @@ def top_at(
     return angle, height
 
 
-@part
+@inline
 def highest_top(
     curve: Callable[..., tuple[float, float]], sign: float, samples: Array, level: float, data: Any
 ) -> tuple[float, float, int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kernels.cache_folder import CACHE_DIR
 from kernels.curves.periodic import turn_extremes
 
 SAMPLES = 101
@@ -67,3 +68,9 @@ def test_a_top_lower_by_more_than_the_errors_is_not_the_place_though_it_comes_fi
     np.testing.assert_allclose([largest[0], near[0]], [1.0 + 1e-6, 1.0], rtol=1e-7)
     largest, far, _, _ = extremes(curve, 5e-7)
     np.testing.assert_allclose([largest[0], far[0]], [1.0 + 1e-6, 1.0 + np.pi], rtol=1e-7)
+
+
+def test_machine_code_is_kept_on_disk():
+    """A kernel that hands a function on to others that are not folded in is refused by the cache, without a word."""
+    extremes([np.sin])
+    assert list((CACHE_DIR / "curves" / "periodic").glob("periodic.turn_extremes-*.nbi"))
