@@ -59,8 +59,8 @@ THREAD_EFFICIENCY = 0.97
 
 # Evaluations of a local search, evaluations to compile and time one, and evaluations equivalent to a population of
 # needle drives: 27 and 29 s at 9 ms each were measured, without and with margins for tolerances.  If a trial search
-# converges within TRIED_SECONDS, its own number of evaluations is used.  The others are long: 600 is the median over
-# twelve studies of 140 to 3000 evaluations per start, the longest of a six-bar with a rest.
+# converges within TRIED_SECONDS, its own number of evaluations is used.  The others are long: 600 is a rule of thumb,
+# searches with a rest or a window took up to 3000.
 TYPICAL_LOOKS, TRIED_LOOKS, POPULATION_LOOKS = 600, 40, 3000
 TRIED_SECONDS = 0.5
 NEAR_LOOKS = 75  # evaluations of a search of a front, which starts at its neighbour's optimum: 56 and 73 were measured
