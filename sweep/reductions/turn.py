@@ -103,8 +103,11 @@ def limits_and_reductions(
     finer = accuracy if accuracy.target is None else replace(accuracy, target=min(accuracy.target, END_TARGET))
     for name, stay in stays.items():
         stroke, now = _extrema(family, designs, requests(family, stay, windowed), finer, None)
+        angle, err = window_angle(family, designs, _window(stay.of, stroke, finer, part))
+        if accuracy.target is not None:  # ends that miss their finer target may be good enough for the angle
+            now = np.where((now == st.NOT_CONVERGED) & (err <= accuracy.target), st.OK, now)
         status = np.where(status == st.OK, now, status)
-        columns[name], columns[f"err_{name}"] = window_angle(family, designs, _window(stay.of, stroke, finer, part))
+        columns[name], columns[f"err_{name}"] = angle, err
     return columns | {"status": status.astype(np.uint8)}
 
 

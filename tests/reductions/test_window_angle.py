@@ -191,6 +191,20 @@ def test_error_is_that_of_exact_ends_at_loose_targets(window):
     assert (np.abs(found.window_angle - exact.window_angle) <= found.err_window_angle).all()
 
 
+@pytest.mark.parametrize("law", [1.0, 2.0, 3.0])
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-8])
+def test_stay_of_a_cam_whose_flat_ends_are_found_to_fewer_digits_has_no_status(law, accuracy):
+    """Ends of phases are flat: the search for the ends of the stroke missed its own target of 1e-12 and said so.
+
+    Both halves of these laws are alike, so that the follower is in the upper half from the middle of the rise to the
+    middle of the return: rise/2 + dwell + fall/2.
+    """
+    table = {"lift": 1.0, "rise": 1.2, "dwell": 1.0, "fall": 1.5, "r0": 3.0, "law": law}
+    found = sweep.summarise("cam", table, "window_angle", accuracy=accuracy, window=(0.5, 1.0)).iloc[0]
+    assert found.status == st.OK
+    assert abs(found.window_angle - 2.35) <= found.err_window_angle < 1e-9
+
+
 # The follower of its guide is at its lowest point next to a pose of coarse samples.
 NARROW = {
     "a": 0.18172147599251193, "b": 3.853540537411128, "c": 2.536402990434361,
