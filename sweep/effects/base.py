@@ -31,12 +31,20 @@ def about(kind: str, family: str = "") -> dict[str, Any]:
     """Return the name and the texts of an effect in the register, as arguments of :class:`Effect`.
 
     ``family`` is the name of the only family with the effect, if it is one of those that are made for each of some.
+
+    Raises
+    ------
+    TypeError
+        if the register lacks a text of the effect.
     """
-    table = REGISTER["of_families" if family else "effects"][kind]
+    tables = "of_families" if family else "effects"
+    table = REGISTER[tables][kind]
     texts = about(table["as"]) if "as" in table else {}
     texts |= {key: table[key] for key in _TEXTS if key in table}
     if "formulas" in table:
         texts["formulas"] = tuple(table["formulas"].splitlines())
+    if missing := [key for key in (*_TEXTS, "formulas") if key not in texts]:
+        raise TypeError(f"sweep/effects.toml: [{tables}.{kind}] lacks {', '.join(missing)}")
     if family:
         return texts | {"name": f"{family}_{kind}", "title": f"{texts['title']}: {find_family(family).title}"}
     return texts | {"name": kind}

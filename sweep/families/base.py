@@ -213,6 +213,10 @@ class Family:
     dear: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     precise_poses: PoseFunction | None = None
 
+    def __repr__(self) -> str:
+        """Name it: all its parts would fill pages."""
+        return f"{type(self).__name__}({self.name!r})"
+
     def precise(self) -> Family:
         """Family with the most accurate poses it has: for single poses, not for sweeps."""
         return self._precise

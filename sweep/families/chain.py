@@ -23,7 +23,7 @@ from sweep.families.poses import blocks
 BLOCK = 16384  # poses per block: about ten arrays (1.3 MB) stay in the caches; half or four times this is slower
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Chain(Family):
     """A family of stages in series; the output angle of each stage drives the crank of the next."""
 

@@ -38,7 +38,12 @@ _DERIVED = {
     "kN": (1e3, "t*mm/s^2"),
     "gf": (9.80665e-3, "t*mm/s^2"),
     "lbf": (0.45359237 * 9.80665, "t*mm/s^2"),
+    "cN": (1e-2, "t*mm/s^2"),
+    "Nm": (1e3, "t*mm^2/s^2"),
+    "Nmm": (1.0, "t*mm^2/s^2"),
+    "kPa": (1e-3, "t/mm/s^2"),
     "MPa": (1.0, "t/mm/s^2"),
+    "GPa": (1e3, "t/mm/s^2"),
     "rpm": (2 * math.pi / 60, "rad/s"),
     "MB": (1e6, "B"),
     "GB": (1e9, "B"),
@@ -46,14 +51,18 @@ _DERIVED = {
 }
 SYMBOLS = (*_BASE, *_DERIVED)
 # Alternative spellings of a symbol: "90°", "2 inch", both code points of the micro sign.
-_ALIASES = {"°": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um"}
+_ALIASES = {"°": "deg", "degrees": "deg", "inch": "in", "\u00b5m": "um", "\u03bcm": "um", "RPM": "rpm", "sec": "s"}
+# Signs for products and powers, as results print them: "N·mm", "mm/rad²".
+_SIGNS = str.maketrans({"·": "*", "\u22c5": "*", "¹": "1", "²": "2", "³": "3", "⁴": "4", "⁻": "-"})
+# A speed of a shaft is counted in turns per minute where it is written without them.
+_PER_MINUTE = ("1/min", "min^-1", "min-1", "r/min", "U/min")
 
 LARGEST = 1e100  # magnitude allowed in a study, so that conversion to internal units does not overflow
 # Allowed inputs by internal unit, as messages write them.
 _EXAMPLES = dict(QUANTITIES.values()) | {"B": "a size, in B, MB or GB", "1": 'a pure number, as 0.5 or "50 %"'}
 
 _NUMBER = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*)", re.DOTALL)
-_TERM = re.compile(r"([A-Za-z%°\u00b5\u03bc]+|1)(?:\^(-?[1-9]))?")
+_TERM = re.compile(r"(?:([A-Za-z%°\u00b5\u03bc]+)(?:\^?(-?[1-9]))?|1)")
 
 
 class UnitFault(ValueError):
@@ -86,7 +95,7 @@ def factor(unit: str, internal: str) -> float:
     """
     ours, own = _parsed(internal)
     try:
-        theirs, powers = _parsed(unit)
+        theirs, powers = _parsed("rpm" if internal == "rad/s" and _plainly(unit) in _PER_MINUTE else unit)
     except UnitFault:
         offered = re.split(", | or ", example(internal).partition(", in ")[2])  # a foot is no misspelt ton
         raise UnitFault(f"{example(internal)}{nearest(unit, offered)}") from None
@@ -127,13 +136,23 @@ def read(text: str, internal: str) -> float:
     return number * factor(unit, internal)
 
 
+def _plainly(text: str) -> str:
+    """Write a unit with ASCII signs only: "N mm", "N·mm" and "m/s²" become "N*mm", "N*mm" and "m/s2".
+
+    A space is a product before the first slash; in "N/m s" it could be either.
+    """
+    text = re.sub(r"\s*([*/])\s*", r"\1", text.strip().translate(_SIGNS).replace("**", "^"))
+    above, slash, below = text.partition("/")
+    return re.sub(r"\s+", "*", above) + slash + below
+
+
 def _parsed(text: str) -> tuple[float, Counter[str]]:
     """Parse a product of known symbols with integer exponents into a size in base units and their powers."""
-    parts = re.split(r"\s*([*/])\s*", text.strip())
+    parts = re.split(r"([*/])", _plainly(text))
     size, powers = 1.0, Counter[str]()
     for operator, part in zip(["*", *parts[1::2]], parts[::2], strict=True):
         match = _TERM.fullmatch(part)
-        symbol = part if match is None else _ALIASES.get(match[1], match[1])
+        symbol = part if match is None else _ALIASES.get(match[1] or part, match[1] or part)
         if match is None or symbol not in (*SYMBOLS, "1"):
             raise UnitFault(text)
         own, of = _DERIVED.get(symbol, (1.0, symbol))

@@ -146,7 +146,7 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
             if entry is not True:
                 faults.value(key, entry, "true")
             limits.append(Limit(name, minimum=1.0))
-        elif isinstance(entry, str) and ("+-" in entry or entry.lstrip()[:1] in _SIDES):
+        elif isinstance(entry, str) and ("+-" in entry or "±" in entry or entry.lstrip()[:1] in _SIDES):
             limits += _read_text(output, entry, key, faults)
         elif isinstance(entry, dict):
             limits += _read_bounds(output, entry, key, faults)
@@ -195,7 +195,7 @@ def _read_bounds(output: Output, raw: Mapping[str, Any], key: Key, faults: Fault
 def _read_text(output: Output, text: str, key: Key, faults: Faults) -> list[Limit]:
     """Read a value with its band, as "40 +- 0.2 deg", or a bound on one side, as "<= 45 deg"."""
     internal = units.internal_unit(output.unit)
-    middle, band, rest = text.partition("+-")
+    middle, band, rest = text.replace("±", "+-").partition("+-")
     form, sign = f"a value and its band, as {_band(internal)}", ""
     if not band:
         sign, rest = _SIDE.fullmatch(text.strip()).groups()  # type: ignore[union-attr]

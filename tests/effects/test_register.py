@@ -16,7 +16,7 @@ from sweep.cli import main
 from sweep.cli.effects import every_input
 from sweep.effects import NAMES, applicable, effect, extended, offered
 from sweep.effects.advice import closure, findings, left_out, tree
-from sweep.effects.base import PlacedEffect
+from sweep.effects.base import REGISTER, PlacedEffect, about
 from sweep.families import NAMES as FAMILIES
 from sweep.families import family
 from sweep.families.capabilities import JointRecords, ThreadPath
@@ -53,6 +53,14 @@ def test_rows_of_the_page_for_any_link_or_joint_hold_for_those_of_their_kinds():
                             seen += 1
                 assert sorted(named) == sorted(row[0] for row in table)
     assert seen > 500
+
+
+def test_a_text_that_the_register_lacks_is_named(monkeypatch):
+    """It was a TypeError about arguments of a class, which the writer of the register does not know."""
+    entry = {key: text for key, text in REGISTER["effects"]["pressure"].items() if key != "title"}
+    monkeypatch.setitem(REGISTER["effects"], "pressure", entry)
+    with pytest.raises(TypeError, match=re.escape("sweep/effects.toml: [effects.pressure] lacks title")):
+        about("pressure")
 
 
 @pytest.mark.parametrize("name", NAMES)

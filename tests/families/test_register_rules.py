@@ -204,7 +204,9 @@ def test_a_capability_that_a_family_lacks_is_named():
         family("guide").the(PresserFoot)
 
 
-def test_a_machine_is_shown_by_its_name():
-    """At the end of a cell of a notebook it printed all its parts, three million letters."""
-    shown = repr(sweep.machine({"needle": ["rssr", "guide"], "looper": "rssr"}))
-    assert shown == "Machine('machine (needle: rssr+guide, looper: rssr)')"
+def test_families_chains_and_machines_are_shown_by_their_names():
+    """At the end of a cell of a notebook they printed all their parts, a machine three million letters."""
+    shown = [family("rssr"), family(["rssr", "guide"]), sweep.machine({"needle": ["rssr", "guide"], "looper": "rssr"})]
+    assert list(map(repr, shown)) == [
+        "Family('rssr')", "Chain('rssr+guide')", "Machine('machine (needle: rssr+guide, looper: rssr)')",
+    ]  # fmt: skip

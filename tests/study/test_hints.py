@@ -53,8 +53,8 @@ def test_hint_is_what_is_meant_or_nothing(word: str, known: list[str], meant: st
         ("ft", "mm", "m or inch"),
         ("mmm", "mm", "did you mean 'mm'?"),
         ("KG", "t", "did you mean 'kg'?"),
-        ("Nmm", "N*mm", "did you mean 'N*mm'?"),
-        ("mm/s2", "mm/s^2", "did you mean 'mm/s^2'?"),
+        ("N-mm", "N*mm", "did you mean 'N*mm'?"),
+        ("mm/ss", "mm/s^2", "did you mean 'mm/s^2'?"),
         ("rmp", "rad/s", "did you mean 'rpm'?"),
     ],
 )

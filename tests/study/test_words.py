@@ -88,6 +88,7 @@ def faults_of(folder, text):
         ('"≥ 100 mrad"', Limit("swing", 0.1, None)),
         ('"≤ 45 deg"', Limit("swing", None, math.radians(45.0))),
         ('"40 +- 0.2 deg"', Limit("swing", math.radians(39.8), math.radians(40.2))),
+        ('"40 ± 0.2°"', Limit("swing", math.radians(39.8), math.radians(40.2))),
     ],
 )
 def test_bound_is_read_as_it_is_written(tmp_path, text, limit) -> None:

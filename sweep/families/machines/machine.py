@@ -32,7 +32,7 @@ from sweep.families.sites import AXES
 WITH_STEP: tuple[type[Relation], ...] = (Taking, Entering, Sewing, ShaftTorque, Shaking, Pressing)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Machine(Family):
     """A family made of members.
 
@@ -44,9 +44,6 @@ class Machine(Family):
     members: tuple[Member, ...] = ()
     relations: tuple[Relation, ...] = ()
     timings: tuple[Timing | EventValue, ...] = ()
-
-    def __repr__(self) -> str:
-        return f"Machine({self.name!r})"
 
     def member(self, name: str) -> Member:
         """Return the member of a name."""
