@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from kernels.types import Array as Array
 from sweep.families.parameter import PER_RADIAN as PER_RADIAN
+from sweep.families.parameter import Event as Event
 from sweep.families.parameter import Output as Output
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
@@ -83,26 +84,6 @@ class Angles(NamedTuple):
     def part(self, rows: Any, poses: slice = slice(None)) -> Angles:
         """Select designs, unless all share the angles, and poses."""
         return Angles(*(np.ascontiguousarray(x[rows if len(x) > 1 else slice(None), poses]) for x in self))
-
-
-@dataclass(frozen=True)
-class Event:
-    """An event where a pose output passes a level: entry, landing, loss of contact.
-
-    Parameters
-    ----------
-    name : of the event; ``phi_NAME`` is the place of its first occurrence, ``count_NAME`` the number of occurrences
-    of : the pose output that passes the level
-    text : what happens, in words
-    level : in the unit of the output
-    rising : whether the level is passed upwards
-    """
-
-    name: str
-    of: str
-    text: str
-    level: float = 0.0
-    rising: bool = True
 
 
 @dataclass(frozen=True)

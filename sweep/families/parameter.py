@@ -1,4 +1,4 @@
-"""Parameters and outputs of a mechanism family, and the words of their units.
+"""Parameters, outputs and events of a mechanism family, and the words of their units.
 
 Internal units are mm, t, s, rad and units derived from these.  A unit may be a product such as "force/length".
 """
@@ -176,3 +176,23 @@ def reads_as_degrees(largest: float) -> bool:
     (True, False, False)
     """
     return TWO_TURNS < abs(largest) <= TWO_TURNS_DEG and (2.0 * largest).is_integer()
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event where a pose output passes a level: entry, landing, loss of contact.
+
+    Parameters
+    ----------
+    name : of the event; ``phi_NAME`` is the place of its first occurrence, ``count_NAME`` the number of occurrences
+    of : the pose output that passes the level
+    text : what happens, in words
+    level : in the unit of the output
+    rising : whether the level is passed upwards
+    """
+
+    name: str
+    of: str
+    text: str
+    level: float = 0.0
+    rising: bool = True

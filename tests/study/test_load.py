@@ -284,10 +284,7 @@ def test_a_file_with_a_byte_order_mark_and_windows_line_ends(tmp_path: Path) -> 
         *((unit, "N*mm", 1000.0) for unit in ("N m", "N·m", "N\u22c5m", "Nm", "N * m")),
         *((unit, "mm/s^2", 1000.0) for unit in ("m/s²", "m/s2", "m/s**2", "m s^-2", "m·s⁻²")),
         *((unit, "rad/s", math.pi / 30) for unit in ("rpm", "RPM", "1/min", "1 / min", "min⁻¹", "r/min", "rev/min")),
-        ("mm/rad²", "mm/rad^2", 1.0),
-        ("kg mm²", "t*mm^2", 1e-3),
-        ("cN", "N", 0.01),
-        ("GPa", "MPa", 1000.0),
+        *(("mm/rad²", "mm/rad^2", 1.0), ("kg mm²", "t*mm^2", 1e-3), ("cN", "N", 0.01), ("GPa", "MPa", 1000.0)),
     ],
 )
 def test_unit_factors(unit: str, internal: str, factor: float) -> None:
