@@ -14,49 +14,10 @@ import numpy as np
 
 from kernels.families import backrest
 from kernels.types import Array, Status
-from sweep.families.base import Angles, Family, Interval, Output, Parameter, about
+from sweep.families.base import Angles, Family, Interval, Output, Parameter, about, parameters_of
 from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton
 from sweep.families.poses import following, guarded, poses_of
 from sweep.families.skeletons import ORIGIN, moving, parameter, standing
-
-FRAME = (
-    Parameter("a1", "length", "warp stop motion, where the warp ends, to the right of the beam axis"),
-    Parameter("b1", "length", "warp stop motion, above the beam axis"),
-    Parameter("a2", "length", "pivot O2 of the brackets, to the right of the beam axis"),
-    Parameter("b2", "length", "pivot O2 of the brackets, above the beam axis"),
-    Parameter("H", "length", "axis of the back-rest above the line of the bracket"),
-    Parameter("r", "length", "radius of the back-rest", positive=True),
-    Parameter("r0", "length", "radius of the pin under the guide", not_negative=True),
-    Parameter("psi", "angle", "direction of the guide, above the direction towards the beam"),
-    Parameter("xE", "length", "point E of the guide, to the right of the beam axis"),
-    Parameter("yE", "length", "point E of the guide, above the beam axis"),
-    Parameter("f", "ratio", "friction of pin and slider", default=0.0, not_negative=True),
-    Parameter("P1", "force", "weight of the back-rest"),
-    Parameter("P2", "force", "weight of the brackets"),
-    Parameter("lM", "length", "pivot O2 to the end M of the spring on the bracket", not_negative=True),
-    Parameter("nu", "angle", "from the bracket to O2M, upwards"),
-    Parameter("x3", "length", "fixed end of the spring, to the right of the beam axis"),
-    Parameter("y3", "length", "fixed end of the spring, above the beam axis"),
-    Parameter("cs", "stiffness", "stiffness of the spring"),
-    Parameter("l0", "length", "length of the spring at which its force is F0"),
-    Parameter("F0", "force", "preload of the spring"),
-    Parameter("rg", "length", "pivot O2 to the centre of gravity of the brackets"),
-    Parameter("nug", "angle", "from the bracket to its centre of gravity, upwards"),
-    Parameter("s1", "choice", "friction of the guide: +1 as if moving in, -1 out, 0 none",
-              default=1.0, choices=(-1.0, 0.0, 1.0)),
-    Parameter("s2", "choice", "friction of the slider: +1 as if moving in, -1 out, 0 none",
-              default=1.0, choices=(-1.0, 0.0, 1.0)),
-)  # fmt: skip
-
-BEAM = (
-    Parameter("rho_full", "length", "radius of the yarn on the full beam", default=0.0, not_negative=True),
-    Parameter("rho_empty", "length", "radius of the yarn on the empty beam", default=0.0, not_negative=True),
-)
-
-LAW = (
-    Parameter("phi", "angle", "bracket angle above the direction towards the beam, with the full beam"),
-    Parameter("turn", "angle", "what the regulator adds to it until the beam is empty, linear in 1/rho", default=0.0),
-)
 
 GEOMETRY = (
     Output("phi_rho", "rad", "bracket angle at this beam radius", "(13)"),
@@ -93,17 +54,6 @@ BAND = (
 
 DRIFT = Output("drift", "N", "K_couple - K0", "(11)")
 PHI = Output("phi", "rad", "bracket angle that solves the equation", "(12)")
-SOUGHT = (
-    Parameter("phi_lo", "angle", "bracket angles are sought from here"),
-    Parameter("phi_hi", "angle", "bracket angles are sought up to here"),
-    Parameter("root", "count", "which of the bracket angles, counted from phi_lo", default=1.0, positive=True),
-)
-K0 = Parameter("K0", "force", "warp tension wanted", default=0.0)
-HELD = (
-    Parameter("K0", "force", "warp tension to be held"),
-    Parameter("couple", "choice", "1: the slider bears a couple; 0: its reaction acts at the axis of the back-rest",
-              default=1.0, choices=(0.0, 1.0)),
-)  # fmt: skip
 _COLUMNS = backrest.Design._fields
 
 
@@ -130,10 +80,11 @@ def mode_of(mode: backrest.Mode, designs: Array) -> np.ndarray:
     return np.full(len(designs), int(mode), np.uint8)
 
 
-def tension_mode(couple: int, designs: Array) -> np.ndarray:
+def tension_mode(designs: Array) -> np.ndarray:
     """Select the equation that holds the tension: with a couple at the slider, or without one."""
+    couple = parameter(parameters_of("backrest_tension"), "couple", designs)
     with_couple, without = int(backrest.Mode.COUPLE), int(backrest.Mode.TENSION)
-    return np.where(designs[:, couple].real == 1.0, with_couple, without).astype(np.uint8)
+    return np.where(couple.real == 1.0, with_couple, without).astype(np.uint8)
 
 
 def beam_of(names: tuple[str, ...]) -> Interval:
@@ -214,14 +165,9 @@ def _to_fell(angles: Angles, r: Array, x: Array, y: Array, gamma: Array) -> tupl
     return x + r * np.sin(gamma), y + r * np.cos(gamma)
 
 
-def _entry(
-    name: str,
-    parameters: tuple[Parameter, ...],
-    modes: Callable[[Array], np.ndarray],
-    outputs: tuple[Output, ...],
-    position: str,
-) -> Family:
+def _entry(name: str, modes: Callable[[Array], np.ndarray], outputs: tuple[Output, ...], position: str) -> Family:
     """Make an entry of the back-rest; its first output is the bracket angle, ``modes`` selects the equation."""
+    parameters = parameters_of(name)
     names = tuple(p.name for p in parameters)
 
     def kernel(designs: Array, radius: Array, status: Status, blocks: _Blocks) -> None:
@@ -231,7 +177,7 @@ def _entry(
         backrest.poses(matrix.astype(dtype, copy=False), radius, modes(designs), status, *blocks)
 
     def drift(designs: Array, tension: Array) -> Array:
-        return tension - designs[:, [names.index(K0.name)]]
+        return tension - designs[:, [names.index("K0")]]
 
     groups = {"geometry": (outputs[0], *GEOMETRY[1:]), "loads": LOADS, "band": BAND}
     solved = poses_of(kernel, _Blocks, groups, angles="phi")
@@ -249,13 +195,8 @@ def _entry(
 
 _SOLVED = (PHI, *GEOMETRY[1:], *LOADS, *BAND)
 
-FAMILY = _entry(
-    "backrest", (*FRAME, *LAW, *BEAM, K0), partial(mode_of, backrest.Mode.LAW),
-    GEOMETRY[:-1] + LOADS + BAND + (DRIFT,), "K_couple",
-)  # fmt: skip
+FAMILY = _entry("backrest", partial(mode_of, backrest.Mode.LAW), GEOMETRY[:-1] + LOADS + BAND + (DRIFT,), "K_couple")
 
-TENSION = _entry(
-    "backrest_tension", (*FRAME, *HELD, *SOUGHT, *BEAM), partial(tension_mode, len(FRAME) + 1), _SOLVED, "phi"
-)
+TENSION = _entry("backrest_tension", tension_mode, _SOLVED, "phi")
 
-CLOSURE = _entry("backrest_closure", (*FRAME, *SOUGHT, *BEAM), partial(mode_of, backrest.Mode.CLOSURE), _SOLVED, "phi")
+CLOSURE = _entry("backrest_closure", partial(mode_of, backrest.Mode.CLOSURE), _SOLVED, "phi")

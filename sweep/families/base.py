@@ -18,6 +18,7 @@ from sweep.families.parameter import Output as Output
 from sweep.families.parameter import Parameter as Parameter
 from sweep.families.parameter import Unit as Unit
 from sweep.families.register import about as about
+from sweep.families.register import parameters_of as parameters_of
 
 
 @dataclass(frozen=True)

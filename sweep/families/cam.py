@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import cam
 from kernels.types import Array
-from sweep.families.base import Angles, Family, Output, Parameter, about
+from sweep.families.base import Angles, Family, Output, Parameter, about, parameters_of
 from sweep.families.capabilities import Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Switches
 from sweep.families.outputs import coordinate_outputs, kinked, ladders
@@ -14,30 +14,13 @@ from sweep.families.planar_trees import sliding_follower, swinging_follower
 from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import ORIGIN, X, dimensions, line, links, moving, parameter, standing
 
-PHASES = (
-    Parameter("rise", "angle", "cam angle of the rise", positive=True, default=0.5 * np.pi),
-    Parameter("dwell", "angle", "cam angle of the dwell at full lift", not_negative=True, default=0.5 * np.pi),
-    Parameter("fall", "angle", "cam angle of the return; what is left is a dwell", positive=True, default=0.5 * np.pi),
-    Parameter("start", "angle", "cam angle at which the rise begins", default=0.0),
-    Parameter(
-        "law", "choice", "1: 3-4-5 polynomial, 2: modified sine, 3: cycloidal, 4: Fourier table", default=1.0,
-        choices=(1.0, 2.0, 3.0, 4.0),
-    ),
-)  # fmt: skip
-
 TABLE = tuple(
     Parameter(f"{letter}{k}", "ratio", f"{function}({k} phi) of the Fourier table, in lifts", default=0.0)
     for letter, function in (("c", "cos"), ("s", "sin"))
     for k in range(1, cam.HARMONICS + 1)
 )
 
-PARAMETERS = (
-    Parameter("lift", "length", "lift of the follower", positive=True),
-    *PHASES,
-    Parameter("r0", "length", "radius of the prime circle, on which the roller's centre rests", positive=True),
-    Parameter("e", "length", "offset of the follower's line, to the right of the direction of lift", default=0.0),
-    *TABLE,
-)
+PARAMETERS = (*parameters_of("cam"), *TABLE)
 
 PROFILE_OUTPUTS = (
     *coordinate_outputs("s", "length", "displacement of the follower from its rest", "(1)", "(1)"),
@@ -101,16 +84,7 @@ FAMILY = Family(
 )
 
 
-LEVER_PARAMETERS = (
-    Parameter("lift", "angle", "swing of the lever", positive=True),
-    *PHASES,
-    Parameter("r0", "length", "radius of the prime circle, on which the roller's centre rests", positive=True),
-    Parameter("c", "length", "lever, from its axis to the roller's centre", positive=True),
-    Parameter("e", "length", "distance of the lever's axis from the cam's along x", positive=True),
-    Parameter("branch", "sign", "sign of psi: the side of the line of axes on which the roller is", default=1.0,
-              choices=(-1.0, 1.0)),
-    *TABLE,
-)  # fmt: skip
+LEVER_PARAMETERS = (*parameters_of("cam_lever"), *TABLE)
 
 LEVER_OUTPUTS = (
     *coordinate_outputs("psi", "rad", "lever angle in (-pi, pi), 0 away from the cam", "(9)", "(9)"),

@@ -5,13 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping
+from typing import get_args
 
 from kernels.linkage.bodies import DRIVEN
 from sweep.families.base import Family, March, Turn
 from sweep.families.capabilities import Assembly, Dimensions, JointRecords, OutputLink, Skeleton
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import ERROR, MINUS
-from sweep.families.parameter import WORDS, is_known, of_derivative
+from sweep.families.parameter import WORDS, Unit, is_known, of_derivative
 
 _NAME = re.compile(r"[a-z][a-z0-9_]*")
 _LETTERS = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -55,6 +56,8 @@ def _names(family: Family) -> list[str]:
             faults.append(f"parameter {p.name}: its default {p.default:g} is none of its choices")
         if not p.text:
             faults.append(f"parameter {p.name}: say in words what it is (text)")
+        if p.unit not in get_args(Unit):
+            faults.append(f"parameter {p.name}: {p.unit!r} is no unit: use one of {', '.join(get_args(Unit))}")
     return faults
 
 

@@ -10,40 +10,14 @@ from kernels.families import cylindrical_looper
 from kernels.families.cylindrical_looper.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
+from sweep.families.base import Angles, Columns, Family, Output, about, parameters_of
 from sweep.families.capabilities import Assembly, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import filled_by, poses_of
 from sweep.families.skeletons import crank_axis, links, parameter, squared, standing
 
-PARAMETERS = (
-    Parameter("a1", "length", "crank that swings the shaft", positive=True),
-    Parameter("b1", "length", "coupler of the swinging drive", positive=True),
-    Parameter("c1", "length", "rocker on the shaft", positive=True),
-    Parameter("e1", "length", "common perpendicular, from the axis of crank 1 to the looper's shaft"),
-    Parameter("f1", "length", "offset of the plane of crank 1 along its axis", default=0.0),
-    Parameter("g1", "length", "height of the rocker's ball along the shaft; where it slides, at s = 0", default=0.0),
-    Parameter("alpha1", "angle", "angle from the axis of crank 1 to the looper's shaft", default=0.0),
-    Parameter("branch1", "sign", "assembly mode of the swinging drive", default=1.0, choices=(-1.0, 1.0)),
-    Parameter("a2", "length", "crank that moves the shaft along", positive=True),
-    Parameter("b2", "length", "coupler of the sliding drive", positive=True),
-    Parameter("e2", "length", "common perpendicular, from the axis of crank 2 to the shaft", default=0.0),
-    Parameter("f2", "length", "offset of the plane of crank 2 along its axis", default=0.0),
-    Parameter("alpha2", "angle", "90 deg minus the angle between the axis of crank 2 and the shaft", default=0.0),
-    Parameter("offset2", "angle", "angle of crank 2 where phi = 0", default=0.0),
-    Parameter("branch2", "sign", "assembly mode of the sliding drive", default=1.0, choices=(-1.0, 1.0)),
-    Parameter("slides", "choice", "1 where the rocker slides with the shaft, 0 where it stays at its height",
-              default=0.0, choices=(0.0, 1.0)),
-    Parameter("p0x", "length", "working point at psi = s = 0, from the rocker's foot along x"),
-    Parameter("p0y", "length", "working point at psi = s = 0, from the rocker's foot along y"),
-    Parameter("p0z", "length", "working point at psi = s = 0, from the rocker's foot along the shaft"),
-    Parameter("d2", "length", "distance of the sliding drive's ball from the shaft's axis", default=0.0),
-    Parameter("beta2", "angle", "place of that ball about the shaft at psi = 0, from x", default=0.0),
-    Parameter("gamma2", "angle", "place of the frame of crank 2 about the shaft, of its x from x", default=0.0),
-    Parameter("mode", "choice", "which of several solutions of the same branches, where d2 is not 0", default=1.0,
-              choices=(1.0, 2.0)),
-)  # fmt: skip
+PARAMETERS = parameters_of("cylindrical_looper")
 
 _D2 = [p.name for p in PARAMETERS].index("d2")
 

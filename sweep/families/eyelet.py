@@ -8,7 +8,7 @@ import numpy as np
 
 from kernels.families import eyelet
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
+from sweep.families.base import Angles, Columns, Family, Output, about, parameters_of
 from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.outputs import ladders
@@ -16,20 +16,7 @@ from sweep.families.planar_trees import eyelet_crank
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import crank_axis, parameter
 
-PARAMETERS = (
-    Parameter("a", "length", "radius of the circle of the eyelet", positive=True),
-    Parameter("e", "length", "distance of the line of the guides from the crank axis, along x"),
-    Parameter("f", "length", "place of the eyelet's circle along the crank axis"),
-    Parameter("alpha", "angle", "angle between the crank axis and the line of the guides"),
-    Parameter("Z1", "length", "place of guide 1 on the line of the guides"),
-    Parameter("Z2", "length", "place of guide 2 on the line of the guides"),
-    Parameter("phi_h", "angle", "angle of the eyelet at phi = 0", default=0.0),
-    Parameter("P_h", "length", "length of thread between the guides at P = 0", default=0.0),
-    Parameter("dX1", "length", "guide 1 off the line x = e, y = 0, along x", default=0.0),
-    Parameter("dY1", "length", "guide 1 off the line x = e, y = 0, along y", default=0.0),
-    Parameter("dX2", "length", "guide 2 off the line x = e, y = 0, along x", default=0.0),
-    Parameter("dY2", "length", "guide 2 off the line x = e, y = 0, along y", default=0.0),
-)
+PARAMETERS = parameters_of("eyelet")
 
 POSE_OUTPUTS = (
     Output("P", "length", "thread taken up, L - P_h", "(6)"),

@@ -14,7 +14,19 @@ import numpy as np
 from kernels.families import feed
 from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about, floats
+from sweep.families.base import (
+    Accuracy,
+    Angles,
+    Columns,
+    Family,
+    Output,
+    Parameter,
+    Step,
+    Work,
+    about,
+    floats,
+    parameters_of,
+)
 from sweep.families.capabilities import Arm, Dimensions, Link, MovingPoint, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.feed_trees import three_leads, two_leads
@@ -26,45 +38,7 @@ from sweep.families.sites import AXES
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, moving, parameter, standing
 from sweep.numerics.records import Mask
 
-ROCKER = (
-    Parameter("h_a", "length", "horizontal chain: crank", positive=True),
-    Parameter("h_b", "length", "horizontal chain: coupler", positive=True),
-    Parameter("h_c", "length", "horizontal chain: rocker", positive=True),
-    Parameter("h_e", "length", "horizontal chain: from the crank axis to the rocker axis, along x"),
-    Parameter("h_f", "length", "horizontal chain: offset of the crank plane; 0 if planar", default=0.0),
-    Parameter("h_g", "length", "horizontal chain: offset of the rocker plane; 0 if planar", default=0.0),
-    Parameter("h_alpha", "angle", "horizontal chain: angle between the axes; 0 if planar", default=0.0),
-    Parameter("rh", "length", "arm of the rocker that carries the pin H of the rack"),
-    Parameter("dh", "angle", "from the rocker to that arm", default=0.0),
-)
-SIGMA = Parameter("h_sigma", "sign", "horizontal chain: assembly mode, sign of dF/dpsi", default=1.0,
-                  choices=(-1.0, 1.0))  # fmt: skip
-
-
-def _eccentric(number: str, words: str) -> tuple[Parameter, ...]:
-    return (
-        Parameter(f"xE{number}", "length", f"{words}: centre of turning, along x"),
-        Parameter(f"yE{number}", "length", f"{words}: centre of turning, along y"),
-        Parameter(f"rE{number}", "length", f"{words}: eccentricity", not_negative=True),
-        Parameter(f"dE{number}", "angle", f"{words}: ahead of the crank"),
-    )
-
-
-PARAMETERS = (
-    *ROCKER,
-    *_eccentric("", "lift eccentric"),
-    Parameter("q", "length", "lift coupler", positive=True),
-    Parameter("fx", "length", "joint F of the lift coupler, along the rack from H"),
-    Parameter("fy", "length", "joint F of the lift coupler, across the rack from H"),
-    Parameter("tx", "length", "tooth number 0, along the rack from H"),
-    Parameter("ty", "length", "teeth, across the rack from H"),
-    Parameter("tooth", "count", "number of the tooth that is watched", default=0.0),
-    Parameter("pitch", "length", "distance of two teeth", default=0.0),
-    Parameter("y_plate", "length", "height of the needle plate", default=0.0),
-    SIGMA,
-    Parameter("bar_branch", "sign", "assembly mode of the rack: +1 if F lies to the right of the ray from H to E",
-              default=1.0, choices=(-1.0, 1.0)),
-)  # fmt: skip
+PARAMETERS = parameters_of("feed")
 
 _WAYS = ("along the feed", "upwards")
 
@@ -117,7 +91,7 @@ poses = partial(_poses, feed.poses, POSE_OUTPUTS, ("cos", "sin"))
 
 def _of_chain(parameters: tuple[Parameter, ...], designs: Array, angles: Angles, *names: str) -> list[Array]:
     """Compute outputs of the crank-rocker of the horizontal chain, (n, m) each."""
-    own = np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(parameters, SIGMA.name, designs)])
+    own = np.column_stack([designs[:, [0, 1, 2, 3, 4, 5, 6]], parameter(parameters, "h_sigma", designs)])
     return CRANK_ROCKER.values(own, angles, *names)
 
 
@@ -201,21 +175,7 @@ FAMILY = Family(
 )  # fmt: skip
 
 
-TRIAD_PARAMETERS = (
-    *ROCKER,
-    *_eccentric("2", "eccentric 2"),
-    *_eccentric("3", "eccentric 3"),
-    *(
-        Parameter(f"f{k}{axis}", "length", f"joint of link {k}, {word} the rack from the tooth")
-        for k in (1, 2, 3)
-        for axis, word in (("x", "along"), ("y", "across"))
-    ),
-    *(Parameter(f"q{k}", "length", f"link {k}", positive=True) for k in (1, 2, 3)),
-    Parameter("x0", "length", "where the tooth is about at phi = 0, along x: it chooses the assembly"),
-    Parameter("y0", "length", "where the tooth is about at phi = 0, along y"),
-    Parameter("chi0", "angle", "angle of the rack at phi = 0, about"),
-    SIGMA,
-)
+TRIAD_PARAMETERS = parameters_of("feed_triad")
 
 TRIAD_OUTPUTS = (
     *_place_of_tooth("(15)"),

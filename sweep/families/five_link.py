@@ -8,22 +8,14 @@ from kernels.families import five_link
 from kernels.families.five_link.motion import links as fill_links
 from kernels.linkage.bodies import DRIVEN
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Array, Family, Output, Parameter, about
+from sweep.families.base import Array, Family, Output, about, parameters_of
 from sweep.families.capabilities import Assembly, Link, OutputLink, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import filled_by, poses_of
 from sweep.families.skeletons import CRANK, CRANK_ROCKER_SIZES, ROCKER, crank_axis, standing
 
-PARAMETERS = (
-    crank_rocker.PARAMETERS[0],
-    Parameter("b", "length", "coupler, from the second revolute's axis to the rocker ball", positive=True),
-    *crank_rocker.PARAMETERS[2:-1],  # c e f g alpha
-    Parameter("h", "length", "common perpendicular of the two revolutes, from the crank pin towards the coupler"),
-    Parameter("s2", "length", "offset along the second revolute's axis", default=0.0),
-    crank_rocker.PARAMETERS[-1],
-    Parameter("mode", "choice", "which of several solutions of that sign", default=1.0, choices=(1.0, 2.0, 3.0)),
-)
+PARAMETERS = parameters_of("five_link")
 
 VALUE_OUTPUTS = (
     *coordinate_outputs("psi", "rad", "rocker angle in (-pi, pi]", "(1)", "(5)", circle="the rocker angle"),

@@ -13,34 +13,25 @@ from kernels.families import foot
 from kernels.status import NO_EVENT, OK
 from kernels.types import Array
 from sweep.families import feed
-from sweep.families.base import Accuracy, Angles, Columns, Family, March, Output, Parameter, Step, Work, about, floats
+from sweep.families.base import (
+    Accuracy,
+    Angles,
+    Columns,
+    Family,
+    March,
+    Output,
+    Step,
+    Work,
+    about,
+    floats,
+    parameters_of,
+)
 from sweep.families.capabilities import Fixed, Link, MovingPoint, PresserFoot, Skeleton
 from sweep.families.poses import chosen, equal_steps, guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import moving, standing
 
-FOOT = (
-    Parameter("m", "mass", "foot with its bar", positive=True),
-    Parameter("k", "stiffness", "spring of the foot", not_negative=True),
-    Parameter("F0", "force", "preload of the spring with the foot on the plate, weight included", positive=True),
-    Parameter("omega", "speed", "speed of the crank", positive=True),
-)
-RESTITUTION = Parameter("restitution", "ratio", "of the foot against rack and plate, below 1; 0 does not bounce",
-                        default=0.0, not_negative=True)  # fmt: skip
-
-FABRIC = (
-    Parameter("kf", "stiffness", "of the fabric between foot and ground; 0: rigid", default=0.0, not_negative=True),
-    Parameter("cf", "damping", "of the fabric, which takes the place of restitution", default=0.0, not_negative=True),
-)
-
-PARAMETERS = (
-    *FOOT,
-    Parameter("Y", "length", "amplitude of the rack's height", positive=True),
-    Parameter("p", "length", "depth of the rack's middle below the plate"),
-    RESTITUTION,
-    Parameter("X", "length", "half of the rack's travel along the feed", default=0.0),
-    *FABRIC,
-)
+PARAMETERS = parameters_of("foot")
 
 CLOSED_OUTPUTS = (
     Output("x0", "rad", "event: crank angle at which the rack rises through the plate", "(1)"),
@@ -205,9 +196,9 @@ FAMILY = Family(
 )
 
 
-FEED_PARAMETERS = (*feed.PARAMETERS, *FOOT, RESTITUTION, *FABRIC)
+FEED_PARAMETERS = parameters_of("feed_foot")
 _RACK_COLUMNS = len(feed.PARAMETERS)
-_FEET = [_RACK_COLUMNS + k for k in range(len(FOOT) + 1 + len(FABRIC))]
+_FEET = list(range(_RACK_COLUMNS, len(FEED_PARAMETERS)))
 _PLATE = feed.FAMILY.parameter_names.index("y_plate")
 _PATH = ("y_t", "dy_t", "d2y_t", "x_t", "dx_t", "d2x_t")
 

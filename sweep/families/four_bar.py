@@ -15,18 +15,13 @@ from kernels.types import Array
 from sweep.families import capabilities as can
 from sweep.families import guide
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Columns, Family, Output, PoseFunction, about
+from sweep.families.base import Angles, Columns, Family, Output, PoseFunction, about, parameters_of
 from sweep.families.hardpoints import FOUR_BAR_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import following, on_matrix, step_of
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, links, standing
 
-# a b c e; the coupler point, which is optional; branch
-PARAMETERS = (
-    *guide.PARAMETERS[:4],
-    *(replace(p, default=0.0) for p in guide.PARAMETERS[4:6]),
-    guide.PARAMETERS[-1],
-)
+PARAMETERS = parameters_of("four_bar")
 
 ROCKER_OUTPUTS = (
     *coordinate_outputs("psi", "rad", "rocker angle in (-pi, pi]", "(1)", "(1)", circle="the rocker angle"),

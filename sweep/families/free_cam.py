@@ -9,7 +9,7 @@ import numpy as np
 
 from kernels.families import free_cam
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, March, Output, Parameter, about, floats
+from sweep.families.base import Angles, Columns, Family, March, Output, about, floats, parameters_of
 from sweep.families.capabilities import Link, MovingPoint, Skeleton, ThreadPath
 from sweep.families.curve_features import Bends
 from sweep.families.outputs import kinked, ladders
@@ -17,16 +17,7 @@ from sweep.families.planar_trees import turning_cam
 from sweep.families.poses import following, poses_of
 from sweep.families.skeletons import ORIGIN, parameter, standing
 
-PARAMETERS = (
-    Parameter("a", "1/length", "bend of the edge x = a y^2 in the axes of the cam", not_negative=True),
-    Parameter("X1", "length", "guide 1, x in fixed axes from the cam axis"),
-    Parameter("Y1", "length", "guide 1, y in fixed axes"),
-    Parameter("Z1", "length", "guide 1, distance from the plane of the cam along its axis"),
-    Parameter("X2", "length", "guide 2, x"),
-    Parameter("Y2", "length", "guide 2, y"),
-    Parameter("Z2", "length", "guide 2, on the other side of the plane"),
-    Parameter("P_h", "length", "length of thread between the guides at P = 0", default=0.0),
-)
+PARAMETERS = parameters_of("free_cam")
 
 POSE_OUTPUTS = (
     Output("P", "length", "thread taken up, L - P_h", "(6)"),
@@ -113,13 +104,7 @@ FAMILY = Family(
 )
 
 
-FRICTION_PARAMETERS = (
-    *PARAMETERS,
-    Parameter("mu", "ratio", "coefficient of friction along the edge, across the thread", not_negative=True),
-    Parameter("tension_ratio", "ratio", "tension at guide 2 over tension at guide 1", default=1.0, positive=True),
-    Parameter("mu_thread", "ratio", "friction along the thread; the ratio grows by e^(mu_thread wrap)", default=0.0,
-              not_negative=True),
-)  # fmt: skip
+FRICTION_PARAMETERS = parameters_of("free_cam_friction")
 
 _FREE = {o.name: o for o in POSE_OUTPUTS}
 FRICTION_OUTPUTS = (

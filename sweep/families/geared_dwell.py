@@ -10,7 +10,7 @@ import numpy as np
 from kernels import status as st
 from kernels.families import epicyclic_dwell, geared_dwell
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about, parameters_of
 from sweep.families.capabilities import Link, OutputLink, Skeleton, constant
 from sweep.families.curve_features import Singular, Waves
 from sweep.families.outputs import coordinate_outputs, ladders
@@ -18,10 +18,7 @@ from sweep.families.planar_trees import rolling_planet
 from sweep.families.poses import chosen, filled_each, poses_of
 from sweep.families.skeletons import ORIGIN, moving, parameter, standing
 
-PARAMETERS = (
-    Parameter("k", "ratio", "distance of the pin from the planet centre, in planet radii", positive=True),
-    Parameter("a", "ratio", "offset of the output axis from the carrier axis, in planet radii"),
-)
+PARAMETERS = parameters_of("geared_dwell")
 
 
 def _pin_outputs(place: str) -> tuple[Output, ...]:

@@ -13,23 +13,13 @@ from kernels.families import rssr as rssr_kernels
 from kernels.types import Array
 from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
+from sweep.families.base import Angles, Columns, Family, Output, about, parameters_of
 from sweep.families.hardpoints import GUIDE_POINTS
 from sweep.families.outputs import ALONG_FRAME, coordinate_outputs, joint_outputs, joint_rate_outputs, ladders
 from sweep.families.poses import following, poses_of, together
 from sweep.families.skeletons import CRANK, ORIGIN, ROCKER, Z, line, links, parameter, standing
 
-PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("b", "length", "coupler", positive=True),
-    Parameter("c", "length", "rocker", positive=True),
-    Parameter("e", "length", "frame, from crank pivot to rocker pivot along x"),
-    Parameter("xi", "length", "coupler point along the coupler, from the crank pin"),
-    Parameter("eta", "length", "coupler point across the coupler, 90 deg counter-clockwise"),
-    Parameter("lam", "angle", "direction of the guiding line, from x"),
-    Parameter("h", "length", "offset of the guiding line from the crank pivot, to its left"),
-    Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
-)
+PARAMETERS = parameters_of("guide")
 
 VALUE_OUTPUTS = (
     *coordinate_outputs("s", "length", "coupler point along the line, from the foot of the crank pivot", "(4)", "(5)"),

@@ -6,7 +6,7 @@ import numpy as np
 
 from kernels.families import guided_cam
 from kernels.types import EPS, Array
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about, parameters_of
 from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
@@ -15,13 +15,7 @@ from sweep.families.skeletons import Y, line, moving, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
 PARAMETERS = (
-    Parameter("P_h", "length", "length of thread between the guides at P = 0", positive=True),
-    Parameter("X1", "length", "place of the guides along the cam axis's perpendicular"),
-    Parameter("Z1", "length", "half the distance of the guides, which stand symmetrically to the plane of the cam"),
-    Parameter("e", "length", "place of the follower's way along the same perpendicular"),
-    Parameter("R0", "length", "radius of the cam at the least displacement", default=0.0, not_negative=True),
-    Parameter("mu1", "ratio", "coefficient of friction on the cam", default=0.1, not_negative=True),
-    Parameter("mu2", "ratio", "coefficient of friction in the guide", default=0.1, not_negative=True),
+    *parameters_of("guided_cam"),
     *(Parameter(f"A{k}", "length", f"coefficient of cos({k} phi) in P", default=0.0) for k in _ORDERS),
     *(Parameter(f"B{k}", "length", f"coefficient of sin({k} phi) in P", default=0.0) for k in _ORDERS),
 )

@@ -6,32 +6,14 @@ import numpy as np
 
 from kernels.families import heddle
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, about
+from sweep.families.base import Angles, Columns, Family, Output, about, parameters_of
 from sweep.families.capabilities import Assembly, Dimensions, Fixed, Link, MovingPoint, Skeleton
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.planar_trees import heddle_shaft
 from sweep.families.poses import poses_of
 from sweep.families.skeletons import ORIGIN, Y, Z, line, links, moving, parameter, squared, standing
 
-PARAMETERS = (
-    Parameter("O2B", "length", "arm of the cam lever", positive=True),
-    Parameter("BC", "length", "rod from the cam lever to the bell crank", positive=True),
-    Parameter("O3C", "length", "upper arm of the bell crank", positive=True),
-    Parameter("O2O3", "length", "frame, from the pivot of the cam lever to that of the bell crank", positive=True),
-    Parameter("O4E", "length", "arm of the shaft lever to the heddle rod", positive=True),
-    Parameter("chi_mid", "angle", "bell-crank angle at mid-stroke of the shaft"),
-    Parameter("O3D", "length", "lower arm of the bell crank; 0 with the next three: parallel linkage, equal angles",
-              default=0.0, not_negative=True),
-    Parameter("O4F", "length", "arm of the shaft lever to the link", default=0.0, not_negative=True),
-    Parameter("O3O4", "length", "frame, from the pivot of the bell crank to that of the shaft lever",
-              default=0.0, not_negative=True),
-    Parameter("DF", "length", "link from the bell crank to the shaft lever", default=0.0, not_negative=True),
-    Parameter("EG", "length", "heddle rod; 0 if it is long", default=0.0, not_negative=True),
-    Parameter("x_s", "length", "distance of the vertical slide from the pivot of the shaft lever", default=0.0),
-    Parameter("side_F", "sign", "+1: the arms O3D, O4F point to the left of O3O4", default=1.0, choices=(-1.0, 1.0)),
-    Parameter("side_C", "sign", "assembly mode: +1 if C lies to the left of the ray from B to O3",
-              default=1.0, choices=(-1.0, 1.0)),
-)  # fmt: skip
+PARAMETERS = parameters_of("heddle")
 
 VALUE_OUTPUTS = (
     *coordinate_outputs("chi", "rad", "bell-crank angle, direction of O3C from the line O2O3", "(4)", "(5)"),

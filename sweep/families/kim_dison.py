@@ -15,21 +15,12 @@ from kernels.families import rssr
 from kernels.types import Array, Status
 from sweep.families import capabilities as can
 from sweep.families import rssr as crank_rocker
-from sweep.families.base import Accuracy, Columns, Family, Output, Parameter, Step, about
+from sweep.families.base import Accuracy, Columns, Family, Output, Step, about, parameters_of
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import Made, chosen, following, on_matrix, step_of
 from sweep.families.skeletons import CRANK_ROCKER, Y, links, standing
 
-PARAMETERS = (
-    Parameter("r", "length", "crank", positive=True),
-    Parameter("l", "length", "coupler", positive=True),
-    Parameter("h", "length", "rocker", positive=True),
-    Parameter("a", "length", "distance of the rocker axis from the crank axis, along y"),
-    Parameter("b", "length", "distance of the rocker axis from the crank plane, along z"),
-    Parameter("omega1", "speed", "angular velocity of the crank", default=1.0),
-    Parameter("epsilon1", "angular_acceleration", "angular acceleration of the crank", default=0.0),
-    Parameter("branch", "sign", "assembly mode: +1 or -1, the source's sign s", default=1.0, choices=(-1.0, 1.0)),
-)
+PARAMETERS = parameters_of("kim_dison")
 
 _ANGLE = 0.5 * np.pi  # between the axes
 # The crank-rocker's x runs from axis to axis, its z along the rocker's axis, its origin is b above this one.

@@ -15,20 +15,13 @@ from numpy.typing import NDArray
 from kernels.families import rssp
 from kernels.types import EPS, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, PoseFunction, Step, about
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, PoseFunction, Step, about, parameters_of
 from sweep.families.hardpoints import PLANAR_SLIDER_POINTS, SLIDER_CRANK_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import Made, chosen, filled_by, following, move_records, poses_of, step_of
 from sweep.families.skeletons import ORIGIN, SLIDER_CRANK, SLIDER_CRANK_SIZES, X, Y, crank_axis, squared, standing
 
-PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("b", "length", "coupler", positive=True),
-    Parameter("e", "length", "common perpendicular of crank axis and slide line, from the axis to the line"),
-    Parameter("f", "length", "offset of the crank plane along the crank axis"),
-    Parameter("alpha", "angle", "90 deg minus the angle between crank axis and slide direction; 0 if planar"),
-    Parameter("branch", "sign", "assembly mode: sign of s - y_B", default=1.0, choices=(-1.0, 1.0)),
-)
+PARAMETERS = parameters_of("rssp")
 
 VALUE_OUTPUTS = (
     *coordinate_outputs("s", "length", "slider displacement from the foot of the common perpendicular", "(2)", "(5)"),
@@ -164,12 +157,7 @@ FAMILY = Family(
 )
 
 
-PLANAR_PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("b", "length", "connecting rod", positive=True),
-    Parameter("e", "length", "offset of the slide line from the crank pivot, to its left", default=0.0),
-    Parameter("branch", "sign", "assembly mode: sign of s - x_B", default=1.0, choices=(-1.0, 1.0)),
-)
+PLANAR_PARAMETERS = parameters_of("slider_crank")
 
 PLANAR_OUTPUTS = (
     *coordinate_outputs("s", "length", "slider displacement from the foot of the crank pivot", "(1)", "(3)"),

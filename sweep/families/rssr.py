@@ -11,23 +11,14 @@ from kernels import status as st
 from kernels.families import rssr
 from kernels.types import TWO_PI, Array
 from sweep.families import capabilities as can
-from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Parameter, Step, Work, about
+from sweep.families.base import Accuracy, Angles, Columns, Family, Output, Step, Work, about, parameters_of
 from sweep.families.hardpoints import CRANK_ROCKER_POINTS
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders
 from sweep.families.poses import chosen, filled_by, move_records, on_matrix, optional_outputs, poses_of, together
 from sweep.families.provable import CRANK_ROCKER_BY_AXES, CRANK_ROCKER_BY_ROCKER
 from sweep.families.skeletons import CRANK_ROCKER, CRANK_ROCKER_SIZES, crank_axis, standing
 
-PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("b", "length", "coupler", positive=True),
-    Parameter("c", "length", "rocker", positive=True),
-    Parameter("e", "length", "common perpendicular of the two axes, from crank axis to rocker axis"),
-    Parameter("f", "length", "offset of the crank plane along the crank axis"),
-    Parameter("g", "length", "offset of the rocker plane along the rocker axis"),
-    Parameter("alpha", "angle", "angle between the axes"),
-    Parameter("branch", "sign", "assembly mode: sign of dF/dpsi", default=1.0, choices=(-1.0, 1.0)),
-)
+PARAMETERS = parameters_of("rssr")
 
 # Axes of joint coordinates in the frame of the rocker.
 WAYS = ("along the common perpendicular of the axes", "across it and the rocker axis", "along the rocker axis")

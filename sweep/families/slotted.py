@@ -16,7 +16,7 @@ from kernels.families.slotted import links as fill_links
 from kernels.families.swivel import links as fill_swivel_links
 from kernels.linkage.bodies import DRIVEN, FRAME, SLIDE, TURN
 from kernels.types import Array
-from sweep.families.base import Angles, Columns, Family, Output, Parameter, about, floats
+from sweep.families.base import Angles, Columns, Family, Output, Parameter, about, floats, parameters_of
 from sweep.families.capabilities import Assembly, Dimensions, Link, OutputLink, Skeleton
 from sweep.families.curve_features import Singular
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
@@ -26,20 +26,7 @@ from sweep.families.poses import filled_by, poses_of, together
 from sweep.families.sites import AXES
 from sweep.families.skeletons import CRANK, ORIGIN, crank_axis, dimensions, links, moving, standing
 
-PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("e", "length", "common perpendicular of both axes, from the crank axis to the driven axis"),
-    Parameter("f", "length", "offset of the crank plane along the crank axis", default=0.0),
-    Parameter("g", "length", "height of the bar along the driven axis; any for the fork slot", default=0.0),
-    Parameter("alpha", "angle", "angle from the crank axis to the driven axis", default=0.0),
-    Parameter("s", "length", "offset of the slot's middle plane, or of the bar, from the driven axis", default=0.0),
-    Parameter("k", "length", "arm between ball and bar; 0 is the fork slot without an arm", default=0.0,
-              not_negative=True),
-    Parameter("tau", "sign", "side of the bar on which the ball is, seen along it; of no effect for the fork slot",
-              default=1.0, choices=(-1.0, 1.0)),
-    Parameter("branch", "sign", "side of the driven axis on which the ball is along the slot: sign of rho",
-              default=1.0, choices=(-1.0, 1.0)),
-)  # fmt: skip
+PARAMETERS = parameters_of("slotted")
 
 VALUE_OUTPUTS = (
     *coordinate_outputs(
@@ -131,13 +118,7 @@ FAMILY = Family(
 )  # fmt: skip
 
 
-PLANAR_PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("e", "length", "frame, from crank pivot to rocker pivot along x"),
-    Parameter("h", "length", "offset of the slot from the rocker pivot, to its left", default=0.0),
-    Parameter("branch", "sign", "assembly mode: side of the rocker on which the pin is", default=1.0,
-              choices=(-1.0, 1.0)),
-)  # fmt: skip
+PLANAR_PARAMETERS = parameters_of("inverted_slider_crank")
 
 PLANAR_VALUES = (
     *coordinate_outputs("psi", "rad", "rocker angle in (-pi, pi]", "(2)", "(4)"),
@@ -188,14 +169,7 @@ PLANAR = Family(
 )
 
 
-SWIVEL_PARAMETERS = (
-    Parameter("a", "length", "crank", positive=True),
-    Parameter("e", "length", "block's centre from the origin along x"),
-    Parameter("f", "length", "offset of the crank plane along the crank axis", default=0.0),
-    Parameter("g", "length", "block's centre from the origin along z", default=0.0),
-    Parameter("alpha", "angle", "angle from the crank axis to z, about x", default=0.0),
-    Parameter("Lw", "length", "working point from the crank pin along the rod, towards the block", default=0.0),
-)
+SWIVEL_PARAMETERS = parameters_of("swivel")
 
 ROD_OUTPUTS = coordinate_outputs(
     "rho", "length", "rod between crank pin and the block's centre", "(2)", "(3)", kind="sliding "

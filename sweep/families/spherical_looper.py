@@ -10,41 +10,14 @@ from kernels.families import spherical_looper
 from kernels.families.spherical_looper import links as fill_links
 from kernels.linkage.bodies import DRIVEN, TURN
 from kernels.types import Array
-from sweep.families.base import Family, Output, Parameter, about
+from sweep.families.base import Family, Output, about, parameters_of
 from sweep.families.capabilities import Arm, Assembly, Dimensions, Fixed, Link, Skeleton
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree
 from sweep.families.outputs import coordinate_outputs, joint_outputs, ladders, magnitude_outputs, point_outputs
 from sweep.families.poses import filled_by, poses_of
 from sweep.families.skeletons import crank_axis, links, parameter, squared, standing
 
-PARAMETERS = (
-    Parameter("a1", "length", "crank that swings the carrier", positive=True),
-    Parameter("b1", "length", "coupler of the carrier's drive", positive=True),
-    Parameter("c1", "length", "rocker of the carrier", positive=True),
-    Parameter("e1", "length", "common perpendicular, from the shaft of crank 1 to the carrier's axis"),
-    Parameter("f1", "length", "offset of the plane of crank 1 along its shaft", default=0.0),
-    Parameter("g1", "length", "height of the carrier's ball along the carrier's axis", default=0.0),
-    Parameter("alpha1", "angle", "angle from the shaft of crank 1 to the carrier's axis", default=0.0),
-    Parameter("branch1", "sign", "assembly mode of the carrier's drive", default=1.0, choices=(-1.0, 1.0)),
-    Parameter("o", "length", "height of the point Os, where both axes meet, along the carrier's axis"),
-    Parameter("delta", "angle", "angle between the carrier's axis and the looper's"),
-    Parameter("gamma", "angle", "direction of the looper's axis about the carrier's at psi = 0, from x"),
-    Parameter("c0x", "length", "looper's ball at psi = chi = 0, from Os along x"),
-    Parameter("c0y", "length", "looper's ball at psi = chi = 0, from Os along y"),
-    Parameter("c0z", "length", "looper's ball at psi = chi = 0, from Os along z"),
-    Parameter("p0x", "length", "working point at psi = chi = 0, from Os along x"),
-    Parameter("p0y", "length", "working point at psi = chi = 0, from Os along y"),
-    Parameter("p0z", "length", "working point at psi = chi = 0, from Os along z"),
-    Parameter("a2", "length", "crank that swings the looper", positive=True),
-    Parameter("b2", "length", "coupler of the looper's drive", positive=True),
-    Parameter("x2", "length", "centre of crank 2 along x"),
-    Parameter("y2", "length", "centre of crank 2 along y"),
-    Parameter("z2", "length", "centre of crank 2 along z"),
-    Parameter("theta2", "angle", "angle between z and the shaft of crank 2", default=0.0),
-    Parameter("beta2", "angle", "direction of the shaft of crank 2 about z, from x", default=0.0),
-    Parameter("offset2", "angle", "angle of crank 2 where phi = 0", default=0.0),
-    Parameter("branch2", "sign", "assembly mode of the looper's drive", default=1.0, choices=(-1.0, 1.0)),
-)
+PARAMETERS = parameters_of("spherical_looper")
 
 CARRIER_OUTPUTS = coordinate_outputs("psi", "rad", "angle of the carrier", "(1)", "(1)")
 LOOPER_OUTPUTS = coordinate_outputs("chi", "rad", "angle of the looper in the carrier", "(3)", "(4)", of_name=True)

@@ -57,7 +57,7 @@ def test_family_of_the_page_keeps_every_rule_and_answers(entry):
 
 
 def test_what_the_entry_lacks_is_said_at_once(entry, monkeypatch):
-    monkeypatch.delitem(register.REGISTER["yoke"], "example")
+    monkeypatch.delitem(register.REGISTER["yoke"]["parameters"]["a"], "example")
     with pytest.raises(FamilyError) as said:
         made(entry.replace("orders=2", "orders=1"))
     for words in ("family yoke: 2 faults", "example lacks 'a'", "derivative_of has 1 orders of 's': name 2"):

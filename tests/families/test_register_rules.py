@@ -141,6 +141,10 @@ BROKEN = {
         {"parameters": (*KEPT.parameters, replace(SIGN, default=0.0))},
         "parameter side: its default 0 is none of its choices",
     ),
+    "unknown unit": (
+        {"parameters": (Parameter("a", "lenght", "crank"),)},  # type: ignore[arg-type]
+        "parameter a: 'lenght' is no unit: use one of length, ",
+    ),
     "example lacks": ({"example": {}}, "example lacks 'a': give an ordinary design"),
     "example has more": ({"example": {"a": 1.0, "b": 1.0}}, "example has 'b', which is no parameter"),
     "example of the wrong sign": ({"example": {"a": -1.0}}, "example has a = -1: give a positive number"),
