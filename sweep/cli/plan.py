@@ -268,6 +268,7 @@ def _effects(study: Study, sample: Pilot) -> list[str]:
         which = f"by {how_many(len(designs), 'design')} spread over the space: none of {tried} tried keeps all limits"
     rods = [p.name for p in study.family.parameters if p.unless and study.space.fixed.get(p.name) == 1.0]
     lines += section("bodies without centre and inertia are slender rods between their joints", _listed(rods))
+    lines += section("bodies taken without mass, as none is given: they cause no force", _listed(_massless(study)))
     lines += section("masses in the joints of their bodies, as centre and inertia are 0", _listed(_points(study)))
     lines += section("fabric that the tool does not enter on its way", _piercing(study, designs))
     lines += section("values that miss the accuracy asked", _late(study))
@@ -306,6 +307,14 @@ def _piercing(study: Study, designs: Array) -> list[str]:
                 count = f"{some.sum()} of {how_many(len(designs), 'design')}"
                 lines.append(f"  {at} = {places} mm is outside {known.passing} = {ends} of {count}: the force {effect}")
     return lines
+
+
+def _massless(study: Study) -> list[str]:
+    """Name the masses that are 0, also by length; a tool often has none."""
+    fixed = study.space.fixed
+    masses = [p.name for p in study.family.parameters if p.unit == "mass" and fixed.get(p.name) == 0.0]
+    links = [name for name in masses if not name.rpartition(".")[2].startswith("m_tool")]
+    return [name for name in links if not fixed.get("line_mass_".join(name.rsplit("m_", 1)), 0.0)]
 
 
 def _points(study: Study) -> list[str]:

@@ -53,7 +53,7 @@ def test_of_a_population_the_best_end_counts_alone() -> None:
     assert found.populations == 3 and not found.enough
     chance = "another population finds a new one with an estimated chance of 33 %"
     assert found.words == f"1 local optimum found, the best by 3 of 3 populations; {chance}"
-    assert found.warnings[-1] == f"{chance}, not the 2 % asked: more populations may find a better one"
+    assert found.warnings[-1] == f"{chance}, not the 2 % wanted: more populations may find a better one"
     assert survey(bowl(), groups, ends, POPULATIONS, "starts").enough
     twice = survey(bowl(), groups, ends[:5], POPULATIONS, "starts")
     assert (twice.basins, twice.best) == (1, 2) and twice.unseen == 1.0 and not twice.enough
@@ -159,7 +159,11 @@ def test_warnings_name_what_was_not_reached() -> None:
     assert found.warnings[0] == "only 4 starts of the 20 asked: no more were found in the design space"
     assert (found.shortcomings, found.doubts) == (found.warnings[:1], found.warnings[1:])
     assert "1 of the 3 distinct starts" in found.warnings[1]
-    assert "an estimated chance of 50 %, not the 2 %" in found.warnings[1]
+    assert "an estimated chance of 50 %, not the 2 % wanted: more starts" in found.warnings[1]
+    # Of n starts in one basin the estimate is 2 / (n (n - 1)): 2.2 % of 10, 1.8 % of 11.
+    few = [replace(found, starts=n, asked=n, basins=1, best=n, unseen=2 / (n * (n - 1))) for n in (8, 10, 11)]
+    takes = "an estimated chance of 3.6 %, not the 2 % wanted, which takes at least 11 starts: more starts"
+    assert takes in few[0].doubts[0] and "at least 11 starts" in few[1].doubts[0] and few[2].doubts == ()
     late = replace(found, ended="time", starts=5, asked=12)
     assert late.warnings == ("time ran out: 5 of 12 starts",)
 

@@ -82,6 +82,29 @@ def test_bodies_of_which_only_the_mass_is_given_are_slender_rods_and_the_plan_sa
     assert lines[at + 1].split(", ") == ["  rod_crank2", "rod_coupler2"]
 
 
+def test_links_whose_mass_is_left_out_are_said_by_the_plan(tmp_path):
+    """Forces of a cam or a heddle drive without masses are 0, with status 0: nothing else tells why."""
+    text = """
+[study]
+name = "cam"
+[mechanism]
+family = "cam"
+[scene]
+speed = "600 rpm"
+want = ["max_force_a"]
+[design]
+lift = "10 mm"
+r0 = { from = 30, to = 40, count = 2, unit = "mm" }
+"""
+    heading = "bodies taken without mass, as none is given: they cause no force"
+    for given, left in (("", ["  m_cam", "m_follower"]), ('[bodies]\nm_follower = "50 g"', ["  m_cam"])):
+        study = load(tmp_path, text + given)
+        lines = _effects(study, pilot(study))
+        assert lines[lines.index(heading) + 1].split(", ") == left
+    whole = load(tmp_path, text + '[bodies]\nm_follower = "50 g"\nm_cam = "80 g"')
+    assert heading not in _effects(whole, pilot(whole))
+
+
 def test_masses_that_lie_in_their_joints_are_said_by_the_plan(tmp_path):
     """The link of a slotted link has no second joint; its arm has a centre of mass."""
     text = """

@@ -107,6 +107,13 @@ class Survey:
         return f"another {another} finds a new one with {chance}"
 
     @property
+    def _too_few(self) -> str:
+        """Say how many starts the wanted share takes if so few can never show it: w = 1 in the note of `survey`."""
+        least = math.ceil(0.5 + math.sqrt(0.25 + 2.0 / self.wanted)) if self.wanted else 0
+        what = "populations" if self.populations else "starts"
+        return f", which takes at least {least} {what}" if self.asked < least else ""
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings that a reader needs before trusting the result."""
         return (*self.shortcomings, *self.doubts)
@@ -135,7 +142,7 @@ class Survey:
             confirmed = f"the best local optimum was found from {self.best} of the {CONFIRMATIONS} {of} wanted"
             parts = [confirmed] if self.best < CONFIRMATIONS else []
             if self.unseen > self.wanted:
-                parts.append(f"{self._chance}, not the {_percent(self.wanted)} asked")
+                parts.append(f"{self._chance}, not the {_percent(self.wanted)} wanted{self._too_few}")
             more = "populations" if self.populations else "starts"
             messages.append(f"{' and '.join(parts)}: more {more} may find a better one")
         return tuple(messages)
