@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from numbers import Real
@@ -93,23 +93,18 @@ def general_route(
     return Route(f"{general} {effect}".rstrip(), outputs, cost, run, general, order)
 
 
+OVER_THE_TURN: Mapping[str, Callable[[Family, Array, Sequence[str], Accuracy], Columns]] = {
+    "margin": margin_group, "means": mean_squares, "events": event_outputs,
+}  # fmt: skip
+"""Reductions that know no window, by their general route."""
+
+
 def _run_general(
-    family: Family,
-    general: GeneralRoute,
-    outputs: tuple[str, ...],
-    designs: Array,
-    accuracy: Accuracy,
-    window: Window,
+    family: Family, general: GeneralRoute, outputs: tuple[str, ...], designs: Array, accuracy: Accuracy, window: Window
 ) -> Columns:
-    match general:
-        case "margin":
-            return margin_group(family, designs, outputs, accuracy)
-        case "means":
-            return mean_squares(family, designs, outputs, accuracy)
-        case "events":
-            return event_outputs(family, designs, outputs, accuracy)
-        case _:
-            return limits_and_reductions(family, designs, outputs, accuracy, window)
+    if general in OVER_THE_TURN:
+        return OVER_THE_TURN[general](family, designs, outputs, accuracy)
+    return limits_and_reductions(family, designs, outputs, accuracy, window)
 
 
 class _StepOutput(NamedTuple):

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 
 from kernels import status as st
@@ -13,7 +11,6 @@ from sweep.families.base import Array, Family
 from sweep.families.curve_features import Singular, Switches, about, switches
 from sweep.numerics.panel_search import first_of_equals
 from sweep.numerics.records import Indices, Mask, joined, only, put
-from sweep.numerics.singularities import Singularities
 from sweep.quantities.kinds import Request
 from sweep.reductions import refine, rounding, sampling
 from sweep.reductions.hidden_tops import Sampled, apart, closer_looks, dips, doubtful, tops_of
@@ -36,45 +33,33 @@ ROUNDED = 64.0  # times what rounding the inputs changes: an error above that is
 TIE = 1e-10  # relative accuracy to which peaks are compared where their places are wanted
 
 
-@dataclass
 class PeakSearch:
     """State of a search: extrema found so far, and number of samples that each design still needs."""
 
-    family: Family
-    designs: Array
-    requests: tuple[Request, ...]
-    target: float
-    locate: bool
-    anywhere: bool
-    window: Window | None
-    found: dict[Request, sampling.Extremum] = field(init=False)
-    status: Status = field(init=False)
-    undone: Indices = field(init=False)
-    names: list[str] = field(init=False)
-    guards: list[str] = field(init=False)
-    near: Singularities | None = field(init=False)
-    torn: Mask = field(init=False)
-
-    def __post_init__(self) -> None:
-        n = len(self.designs)
-        self.found = {request: sampling.Extremum.unknown(n) for request in self.requests}
-        self.status = np.zeros(n, np.uint8)
+    def __init__(
+        self, family: Family, designs: Array, requests: tuple[Request, ...], target: float, locate: bool,
+        anywhere: bool, window: Window | None,
+    ) -> None:  # fmt: skip
+        self.family, self.designs, self.requests, self.target = family, designs, requests, target
+        self.locate, self.anywhere, self.window = locate, anywhere, window
+        self.found = {request: sampling.Extremum.unknown(len(designs)) for request in requests}
+        self.status: Status = np.zeros(len(designs), np.uint8)
         # A discriminant is smooth whatever its sign; the motion is not smooth where it vanishes.
-        self.guards = [] if self.anywhere else list(sampling.discriminants(self.family))
-        position = [self.window.position] if self.window is not None else []
-        self.names = list(dict.fromkeys([*(r.pose for r in self.requests), *position, *self.guards]))
+        self.guards = [] if anywhere else list(sampling.discriminants(family))
+        position = [window.position] if window is not None else []
+        curves = [request.pose for request in requests]
+        self.names = list(dict.fromkeys([*curves, *position, *self.guards]))
+        sharp = bool(about(family, Singular, curves))
+        self.near = nearest(family, designs, curves, MATTERS) if sharp else None
         # Samples that each request still needs for each design; 0 once its extremum is found.
-        curves = [request.pose for request in self.requests]
-        sharp = bool(about(self.family, Singular, curves))
-        self.near = nearest(self.family, self.designs, curves, MATTERS) if sharp else None
-        fewest = (START * denser(self.family, self.designs, self.names, self.near)).astype(np.int64)
-        self.undone = np.tile(fewest, (len(self.requests), 1))
+        fewest = (START * denser(family, designs, self.names, self.near)).astype(np.int64)
+        self.undone = np.tile(fewest, (len(requests), 1))
         self.torn = np.zeros(self.undone.shape, np.bool_)  # (near) jumps and dwells, to be searched on panels
-        if self.near is not None and not self.anywhere:
-            broken(self.family, self.designs, self.near, self.status)
+        if self.near is not None and not anywhere:
+            broken(family, designs, self.near, self.status)
             self.undone[:, self.status != st.OK] = 0
             steep = (self.near.rho.min(axis=1) < NARROWEST) & (self.status == st.OK)
-            self.torn[np.ix_([not request.windowed for request in self.requests], steep)] = True
+            self.torn[np.ix_([not request.windowed for request in requests], steep)] = True
             self.undone[self.torn] = 0
 
     def needed(self, rows: Indices) -> Indices:

@@ -70,12 +70,8 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
     StoreError
         if the report cannot be written.
     """
-    place = located(folder)
-    return _write(place, beside(place) if out is None else Path(out), say)
-
-
-def _write(folder: Path, out: Path, say: Say) -> Path:
-    """Write all files of the report into ``out``."""
+    folder = located(folder)
+    out = beside(folder) if out is None else Path(out)
     data = read_dataset(folder)  # a folder without a dataset is refused before any progress is shown
     say("report", 0, STEPS, "steps")
     data, scanned, cells = read_rows(data)

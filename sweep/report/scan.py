@@ -18,7 +18,8 @@ from sweep.dataset.reading import non_dominated
 from sweep.families.base import Array
 from sweep.families.names import is_error, without_error
 from sweep.quantities.limits import compared
-from sweep.study import Axis, Study
+from sweep.study import Study
+from sweep.study.space import Axis
 
 SCATTER_POINTS = 40_000
 CELLS_OF_PAIR, CELLS_OF_MANY = 240, 32

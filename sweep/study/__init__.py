@@ -4,13 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sweep.study.space import Axis as Axis
-from sweep.study.space import DesignSpace as DesignSpace
-from sweep.study.study import Budget as Budget
 from sweep.study.study import Limit as Limit
-from sweep.study.study import Objective as Objective
 from sweep.study.study import OptimiseSettings as OptimiseSettings
-from sweep.study.study import OutputSettings as OutputSettings
 from sweep.study.study import ParetoSettings as ParetoSettings
 from sweep.study.study import ProveSettings as ProveSettings
 from sweep.study.study import Study as Study
@@ -19,12 +14,11 @@ from sweep.study.study import Tolerance as Tolerance
 if TYPE_CHECKING:
     from sweep.study.load import load_study as load_study
     from sweep.study.load import study_from_data as study_from_data
-    from sweep.study.load import with_accuracy as with_accuracy
 
 
 def __getattr__(name: str) -> Any:
     # Reading a file imports pydantic, which a worker that receives a finished study does not need.
-    if name in ("load_study", "study_from_data", "with_accuracy"):
+    if name in ("load_study", "study_from_data"):
         from sweep.study import load
 
         return getattr(load, name)

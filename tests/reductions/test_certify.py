@@ -18,7 +18,7 @@ from sweep.errors import InputError, StudyError
 from sweep.evaluation.summaries import routes
 from sweep.families import rssr as entry
 from sweep.families.base import Accuracy
-from sweep.study import load_study, with_accuracy
+from sweep.study.load import load_study, with_accuracy
 from tests.support.rssr_designs import random_designs
 
 COLUMNS = ("a", "b", "c", "e", "f", "g", "alpha", "branch")

@@ -25,7 +25,8 @@ from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.base import Accuracy, Array, Columns, Family
 from sweep.quantities.limits import meets
-from sweep.study import Limit, OutputSettings, Study, load_study, study_from_data
+from sweep.study import Limit, Study, load_study, study_from_data
+from sweep.study.study import OutputSettings
 from tests.support.engine_study import CHUNK, SMALL_CHUNKS, chunk_bytes, write_study
 
 ROOT = Path(__file__).parents[2]

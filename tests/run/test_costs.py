@@ -22,7 +22,8 @@ from sweep.families.base import Accuracy, Family
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import margin_suffixes, own_step
 from sweep.reductions.steps import PANELS_NS, beyond_motion, group_ns, own_steps, pose_ns, steps_of
-from sweep.study import OutputSettings, load_study
+from sweep.study import load_study
+from sweep.study.study import OutputSettings
 from tests.bench.costs import PAGE, REASONS, page
 from tests.support.frictional import frictional
 

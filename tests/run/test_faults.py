@@ -33,7 +33,8 @@ from sweep.errors import (
     TimeUsedUp,
     WorkerDied,
 )
-from sweep.study import Budget, Study, load_study
+from sweep.study import Study, load_study
+from sweep.study.study import Budget
 from tests.support.engine_study import CHUNK, ROOT, SMALL, SMALL_CHUNKS, chunk_bytes, write_study
 from tests.support.selection import mostly_long
 

@@ -18,7 +18,8 @@ from sweep.dataset.files import OPTIMUM, beside, read_runs
 from sweep.dataset.store import is_complete
 from sweep.engine.run import run
 from sweep.errors import Interrupted
-from sweep.study import Objective, OptimiseSettings, Study, load_study
+from sweep.study import OptimiseSettings, Study, load_study
+from sweep.study.study import Objective
 from tests.support.engine_study import chunk_bytes, write_study
 
 

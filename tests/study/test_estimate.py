@@ -19,7 +19,8 @@ from sweep.errors import BudgetError
 from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import design_matrix
 from sweep.optimise.starts.dataset import random_designs
-from sweep.study import Budget, Study, load_study, study_from_data
+from sweep.study import Study, load_study, study_from_data
+from sweep.study.study import Budget
 from tests.optimise.test_robust import ROBUST
 
 PROOF = "with the proof that no peak is missed"

@@ -22,8 +22,8 @@ from sweep.chunks.plan import _output_column as output_column
 from sweep.errors import StudyError
 from sweep.families.base import Accuracy
 from sweep.quantities import units
-from sweep.study import Limit, Study, load_study, study_from_data, with_accuracy
-from sweep.study.load import merged
+from sweep.study import Limit, Study, load_study, study_from_data
+from sweep.study.load import merged, with_accuracy
 
 NEEDLE = """
 [study]

@@ -8,18 +8,10 @@ numbers).  A missing or misspelt column, a value that is no number, or a sign th
 :class:`sweep.InputError`, which names column and row.
 """
 
-from sweep.errors import MeasuredRangeWarning as MeasuredRangeWarning
-from sweep.evaluation.thread.diagram import diagram as diagram
-from sweep.evaluation.thread.geometry import eyelet as eyelet
-from sweep.evaluation.thread.geometry import feed as feed
-from sweep.evaluation.thread.geometry import follower as follower
-from sweep.evaluation.thread.geometry import free_cam as free_cam
-from sweep.evaluation.thread.geometry import wrap as wrap
-from sweep.evaluation.thread.tension import capstan as capstan
-from sweep.evaluation.thread.tension import contour as contour
-from sweep.evaluation.thread.tension import least_tension_radius as least_tension_radius
-from sweep.evaluation.thread.tension import path as path
-from sweep.evaluation.thread.tension import speed as speed
+from sweep.errors import MeasuredRangeWarning
+from sweep.evaluation.thread.diagram import diagram
+from sweep.evaluation.thread.geometry import eyelet, feed, follower, free_cam, wrap
+from sweep.evaluation.thread.tension import capstan, contour, least_tension_radius, path, speed
 
 __all__ = [
     "MeasuredRangeWarning", "capstan", "contour", "diagram", "eyelet", "feed", "follower", "free_cam",
