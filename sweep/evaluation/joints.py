@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,6 +47,7 @@ class Part:
     kinds : "axis", "slide" or "point", by fixed joint
     links : the links, with the joints that they connect
     status : (m,)
+    shift : displacement of its frame beside other frames, in a scene that holds several
     """
 
     member: str
@@ -62,6 +63,7 @@ class Part:
     kinds: Mapping[str, str]
     links: tuple[Link, ...]
     status: NDArray[np.uint8]
+    shift: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
     def label(self) -> str:

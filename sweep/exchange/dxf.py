@@ -10,7 +10,7 @@ import numpy as np
 
 from sweep.errors import InputError, extra
 from sweep.evaluation.joints import Part
-from sweep.exchange.scene import PlacedPart, extent, frames_of, shown_name
+from sweep.exchange.scene import extent, frames_of, shown_name
 from sweep.families.base import Array
 
 LAYERS = {"LINKS": 5, "JOINTS": 7, "PIVOTS": 1, "AXES": 8, "PATHS": 3, "TEXT": 7}
@@ -42,7 +42,7 @@ def ezdxf_or_refuse() -> Any:
     return ezdxf
 
 
-def write_dxf(placed: list[PlacedPart], path: Path, unit: str) -> None:
+def write_dxf(placed: list[Part], path: Path, unit: str) -> None:
     """Write the first pose with the joints' paths.
 
     Planar parts are drawn from the front, spatial ones from the side and top as well.
@@ -63,7 +63,7 @@ def write_dxf(placed: list[PlacedPart], path: Path, unit: str) -> None:
         document.layers.add(layer, color=colour)
     space = document.modelspace()
     right, first = 0.0, True
-    for same in frames_of([stage.part for stage in placed]).values():
+    for same in frames_of(placed).values():
         size = extent(same)
         points = np.vstack([path for part in same for path in part.joints.values()])
         spatial = float(np.ptp(points[:, 2])) > 1e-9 * size

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sweep.evaluation.joints import Part
-from sweep.exchange.scene import PlacedPart, extent, shown_name
+from sweep.exchange.scene import extent, shown_name
 from sweep.families.base import Array
 from sweep.families.capabilities import Link
 
@@ -98,13 +98,12 @@ class GltfModel:
         return {"attributes": attributes, "indices": self.accessor(faces.reshape(-1), "SCALAR", ELEMENT_BUFFER)}
 
 
-def write_glb(name: str, placed: list[PlacedPart], path: Path, metres: float, seconds: float) -> None:
+def write_glb(name: str, placed: list[Part], path: Path, metres: float, seconds: float) -> None:
     """Write an animation of one turn in ``seconds``; ``metres`` is the length unit of the joints."""
     model = GltfModel()
-    poses = placed[0].part.phi.size
-    times = model.accessor(np.linspace(0.0, seconds, poses), "SCALAR")
-    size = extent([one.part for one in placed])
-    groups = [_group(model, one, times, size) for one in placed]
+    times = model.accessor(np.linspace(0.0, seconds, placed[0].phi.size), "SCALAR")
+    size = extent(placed)
+    groups = [_group(model, part, times, size) for part in placed]
     half = math.sqrt(0.5)
     root = model.node(name=f"mechanism {name}", rotation=[-half, 0.0, 0.0, half], scale=[metres] * 3, children=groups)
     data = bytes(model.data) + b"\0" * (-len(model.data) % 4)
@@ -133,9 +132,9 @@ def _material(name: str, rgb: tuple[float, float, float]) -> dict[str, Any]:
     return {"name": name, "pbrMetallicRoughness": surface}
 
 
-def _group(model: GltfModel, placed: PlacedPart, times: int, size: float) -> int:
+def _group(model: GltfModel, part: Part, times: int, size: float) -> int:
     """Return the node of a part with those of its links, joints and axes."""
-    part, children, thick = placed.part, [], 0.008 * size
+    children, thick = [], 0.008 * size
     for k, link in enumerate(part.links):
         pairs = list(pairwise(link.joints))
         pairs += [(link.joints[-1], link.joints[0])] if len(link.joints) > 2 else []
@@ -169,7 +168,7 @@ def _group(model: GltfModel, placed: PlacedPart, times: int, size: float) -> int
             )
         )  # fmt: skip
     name = part.label if part.member or part.stage else "stage"
-    return model.node(name=name, translation=placed.shift.tolist(), children=children)
+    return model.node(name=name, translation=part.shift.tolist(), children=children)
 
 
 def _block(model: GltfModel, part: Part, link: Link, colour: str, times: int, thick: float) -> int:

@@ -18,7 +18,7 @@ from sweep.effects.scene import Scene
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
 from sweep.evaluation.poses import evaluate
-from sweep.exchange.scene import PlacedPart, extent, shown_name
+from sweep.exchange.scene import extent, shown_name
 from sweep.families import names
 from sweep.families.base import Angles, Array, Family
 from sweep.families.capabilities import JointRecords
@@ -32,7 +32,7 @@ THICK = 0.008  # thickness of a bar, relative to the extent of all joints
 DRIVING = 1.0  # the finger is at the crank's end of the coupler
 
 
-def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, float], path: Path, unit: str) -> None:
+def write_mjcf(family: Family, placed: list[Part], design: Mapping[str, float], path: Path, unit: str) -> None:
     """Write the model in its first pose; templates/mjcf.xml is its text.
 
     Bodies get the masses, centres and inertias (``m_crank``, ``com_crank_x``, ``j_crank_xx`` ...) of the design,
@@ -44,17 +44,17 @@ def write_mjcf(family: Family, placed: list[PlacedPart], design: Mapping[str, fl
     InputError
         for a stage without crank, coupler and rocker or slider, or a mass without inertia.
     """
-    thick = THICK * extent([stage.part for stage in placed]) * METRES[unit]
+    thick = THICK * extent(placed) * METRES[unit]
     stages = []
-    for k, stage in enumerate(placed):
-        part, before = stage.part, placed[k - 1].part if k else None
+    for k, part in enumerate(placed):
+        before = placed[k - 1] if k else None
         columns = _of_member(design, part.member)
         shaft: tuple[str, float] | None = None  # the joint that turns this stage's crank, and their ratio
         if before is not None and before.member == part.member:
             shaft = f"rocker{_tag(before)}", columns.get(f"kappa{part.stage}", 1.0)
         elif before is not None and isinstance(family, Machine):
-            shaft = _driver(family, part.member, f"crank{_tag(placed[0].part)}")
-        stages.append(_stage(stage, columns, unit, 4.0 * thick) | {"shaft": shaft})
+            shaft = _driver(family, part.member, f"crank{_tag(placed[0])}")
+        stages.append(_stage(part, columns, unit, 4.0 * thick) | {"shaft": shaft})
     text = rendered("mjcf.xml", name=family.name, stages=stages, thick=thick, least=LEAST, words=words)
     path.write_text(text, encoding="utf-8")
 
@@ -81,7 +81,7 @@ def _driver(machine: Machine, name: str, first: str) -> tuple[str, float]:
     return " ".join(word for word in ("rocker", other, names.parts(output).stage) if word), float(member.ratio)
 
 
-def _loop(placed: PlacedPart, finger: float, metres: float) -> tuple[list[Array], list[Array], Array, str]:
+def _loop(part: Part, finger: float, metres: float) -> tuple[list[Array], list[Array], Array, str]:
     """Return a stage in its first pose, from its joint records.
 
     Returns
@@ -89,7 +89,6 @@ def _loop(placed: PlacedPart, finger: float, metres: float) -> tuple[list[Array]
     joints A, B, C, D [m], D is C on a slider; axes of crank, coupler and follower, (3, 3) each, x along the link and z
     along its axis; rotation from the frame of the family's forces to that of its joints; "rocker" or "slider"
     """
-    part = placed.part
     records = part.family.find(JointRecords)
     if records is None:
         allowed = "a family or chain of linkages with crank, coupler and rocker or slider"
@@ -108,7 +107,7 @@ def _loop(placed: PlacedPart, finger: float, metres: float) -> tuple[list[Array]
     crank = np.column_stack([rho_b, tau_b, u])
     turn = _triad(part.joints["b"][0] - part.joints["a"][0], part.axes["a"]) @ crank.T
     points = (center, pose[0:3], pose[3:6], pose[3:6] if records.follower == "slider" else d)
-    joints = [(turn @ (point - center) + part.joints["a"][0] + placed.shift) * metres for point in points]
+    joints = [(turn @ (point - center) + part.joints["a"][0] + part.shift) * metres for point in points]
     coupler, driven = np.column_stack([s, np.cross(n, s), n]), np.column_stack([rho, tau, k])
     return joints, [turn @ crank, turn @ coupler, turn @ driven], turn, records.follower
 
@@ -119,14 +118,13 @@ def _triad(along: Array, axis: Array) -> Array:
     return np.column_stack([x, np.cross(axis, x), axis])
 
 
-def _stage(placed: PlacedPart, design: Mapping[str, float], unit: str, slider: float) -> dict[str, Any]:
+def _stage(part: Part, design: Mapping[str, float], unit: str, slider: float) -> dict[str, Any]:
     """Return a stage as the template writes it: crank, coupler and follower, each a body with its sites.
 
     The coupler is on the body that carries its finger; ``slider`` is the length of one that is drawn [m].
     """
-    part, metres = placed.part, METRES[unit]
-    finger = design.get(f"finger{part.stage}", 0.0)
-    (a, b, c, d), (crank, coupler, driven), turn, follower = _loop(placed, finger, metres)
+    metres, finger = METRES[unit], design.get(f"finger{part.stage}", 0.0)
+    (a, b, c, d), (crank, coupler, driven), turn, follower = _loop(part, finger, metres)
     driving = finger == DRIVING
     origin, axes = (a, crank) if driving else (d, driven)
     position = float(part.position[0])
@@ -140,7 +138,7 @@ def _stage(placed: PlacedPart, design: Mapping[str, float], unit: str, slider: f
         link = next((link.name for link in part.links if joint in link.joints), follower if joint == TIP else "")
         body = link if link in frames else ""
         at, frame = frames.get(body, (np.zeros(3), np.eye(3)))
-        sites[body][shown_name(joint)] = frame.T @ ((path[0] + placed.shift) * metres - at)
+        sites[body][shown_name(joint)] = frame.T @ ((path[0] + part.shift) * metres - at)
     lengths = [float(np.linalg.norm(end)) for end in (b - a, c - b, c - d)]
     frames["coupler"] = axes.T @ (b - origin), axes.T @ coupler
     bodies = {}

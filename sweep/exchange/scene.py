@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,15 +22,7 @@ STEPS = 720  # steps of a march from which one pose is taken
 GAP = 0.25  # gap between two frames side by side, relative to the larger one
 
 
-@dataclass(frozen=True)
-class PlacedPart:
-    """A part, and the displacement of its frame beside other frames."""
-
-    part: Part
-    shift: Array
-
-
-def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[PlacedPart]:
+def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Part]:
     """Return all parts over one turn as in :func:`over`, each with its place in the scene.
 
     Raises
@@ -120,7 +112,7 @@ def pose(mechanism: Mechanism, design: Table, phi: float) -> list[Part]:
     return [_taken(part, [k], steps[[k]]) for part in parts(mechanism, design, steps)]
 
 
-def side_by_side(stages: Sequence[Part]) -> list[PlacedPart]:
+def side_by_side(stages: Sequence[Part]) -> list[Part]:
     """Place the parts of one frame together, and each further frame beside those before it, along x; same order."""
     shifts, right = {}, math.nan
     for frame, same in frames_of(stages).items():
@@ -129,7 +121,7 @@ def side_by_side(stages: Sequence[Part]) -> list[PlacedPart]:
         along = 0.0 if math.isnan(right) else right + GAP * extent(same) - low
         shifts[frame] = np.array([along, 0.0, 0.0])
         right = high + along
-    return [PlacedPart(part, shifts[part.frame]) for part in stages]
+    return [replace(part, shift=shifts[part.frame]) for part in stages]
 
 
 def extent(stages: Sequence[Part]) -> float:

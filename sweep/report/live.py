@@ -20,7 +20,7 @@ from sweep.dataset.chunk_files import batches
 from sweep.errors import InputError
 from sweep.evaluation.curves import motion_curves
 from sweep.evaluation.joints import Part, parts
-from sweep.exchange.scene import PlacedPart, extent, is_spatial, shown_name, side_by_side
+from sweep.exchange.scene import extent, is_spatial, shown_name, side_by_side
 from sweep.families.base import Angles, Array, Family, Interval, Turn
 from sweep.families.names import is_flag, is_largest, reduced, stem
 from sweep.families.poses import equal_steps
@@ -134,7 +134,7 @@ class Motion:
     from_lowest: bool
     curves: dict[str, Array]
     inside: NDArray[np.bool_]
-    placed: tuple[PlacedPart, ...]
+    placed: tuple[Part, ...]
 
 
 def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
@@ -147,7 +147,7 @@ def moving(data: Dataset, shown: Sequence[Shown]) -> dict[str, Any] | None:
     interval = isinstance(family.domain, Interval)
     phase = " from the lowest position" if all(motion.from_lowest for motion in motions) else ""
     variable = quantity(family.domain.name, family.domain.unit)
-    joints = [placed.part for motion in motions for placed in motion.placed]
+    joints = [part for motion in motions for part in motion.placed]
     designs = [_design(data, motion, variable.factor) for motion in motions]
     return {
         "closed": not interval,
@@ -182,7 +182,7 @@ def _motion(data: Dataset, shown: Shown, names: list[str]) -> Motion:
     return Motion(shown, phi[order], from_lowest, curves, inside, _placed(family, design, phi, order))
 
 
-def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[PlacedPart, ...]:
+def _placed(family: Family, design: dict[str, float], phi: Array, order: NDArray[np.intp]) -> tuple[Part, ...]:
     """Return stages and members with their joints in the order of the poses; a march is computed in its own order."""
     try:
         stages = parts(family, design, phi)
@@ -232,18 +232,17 @@ def _design(data: Dataset, motion: Motion, factor: float) -> dict[str, Any]:
         "phi": packed(motion.phi * factor),
         "curves": {name: packed(values * shown[name].factor) for name, values in motion.curves.items()},
         "shaded": runs(motion.inside),
-        "size": extent([one.part for one in motion.placed]) if motion.placed else 0.0,
-        "parts": [_part(one) for one in motion.placed],
+        "size": extent(motion.placed) if motion.placed else 0.0,
+        "parts": [_part(part) for part in motion.placed],
     }
 
 
-def _part(one: PlacedPart) -> dict[str, Any]:
+def _part(part: Part) -> dict[str, Any]:
     """Return joints over the poses, fixed ones once, with axes, kinds and links by the names that the page shows."""
-    part: Part = one.part
     name = {joint: f"{shown_name(joint)}{part.stage}" for joint in part.joints}
     return {
         "label": part.label if part.member or part.stage else "",
-        "shift": one.shift.tolist(),
+        "shift": part.shift.tolist(),
         "joints": {
             name[joint]: packed(path[:1] if joint in part.kinds else path) for joint, path in part.joints.items()
         },

@@ -177,7 +177,7 @@ def optima(data: Dataset, distinct: list[DistinctOptimum]) -> list[Card]:
         return []
     distinct = distinct[:CARDS]
     drawn = [drawn_parts(data.study.family, group.row) for group in distinct]
-    span = max((extent([stage.part for stage in placed]) for placed in drawn if placed), default=0.0)
+    span = max((extent(placed) for placed in drawn if placed), default=0.0)
     best = float(distinct[0].row[objective.name])
     cards = []
     for k, (group, placed) in enumerate(zip(distinct, drawn, strict=True)):

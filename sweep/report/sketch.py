@@ -34,7 +34,7 @@ NEAR = 1e-7  # share of the mechanism's size below which a distance equals a dim
 TELLING = 1e-3  # relative change of dimensions that distinguishes equal ones
 
 
-def drawn_parts(family: Family, design: Mapping[str, float]) -> list[scene.PlacedPart]:
+def drawn_parts(family: Family, design: Mapping[str, float]) -> list[Part]:
     """Return joints and links of a design over one turn, frames side by side; empty without joints or poses."""
     try:
         parts = scene.over(family, {name: float(design[name]) for name in family.parameter_names}, 0.0, POSES)
@@ -43,23 +43,23 @@ def drawn_parts(family: Family, design: Mapping[str, float]) -> list[scene.Place
     return scene.side_by_side(parts) if scene.exists(parts) else []
 
 
-def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[scene.PlacedPart]) -> dict[str, Array]:
+def dimensioned(family: Family, design: Mapping[str, float], placed: Sequence[Part]) -> dict[str, Array]:
     """Return the ends, (2, 3), of the lengths that appear in a position as the distance of two points.
 
     A length is identified by a distance that follows it, when all lengths are changed slightly by different shares.
     """
-    pose = scene.first_pose([stage.part for stage in placed])
+    pose = scene.first_pose(placed)
     lengths = [p.name for p in family.parameters if p.unit == "length" and abs(float(design[p.name])) > 0.0]
     changed = {name: float(design[name]) * (1.0 + TELLING * (k + 1) / len(lengths)) for k, name in enumerate(lengths)}
     other = drawn_parts(family, {**design, **changed})
     if len(other) != len(placed):
         return {}
-    tolerance = NEAR * scene.extent([stage.part for stage in placed])
+    tolerance = NEAR * scene.extent(placed)
     ends: dict[str, Array] = {}
     for stage, changed_stage in zip(placed, other, strict=True):
-        points, moved = _points(stage.part, pose), _points(changed_stage.part, pose)
+        points, moved = _points(stage, pose), _points(changed_stage, pose)
         # The links first: a length of the frame may equal that of a link in some position.
-        linked = [pair for link in stage.part.links for pair in combinations(link.joints, 2)]
+        linked = [pair for link in stage.links for pair in combinations(link.joints, 2)]
         for p, q in [*linked, *combinations(points, 2)]:
             if p not in moved or q not in moved:
                 continue
@@ -85,18 +85,16 @@ def _points(part: Part, pose: int) -> dict[str, Array]:
 
 
 def sketch(
-    placed: Sequence[scene.PlacedPart], title: str, dimensions: Mapping[str, Array] | None = None, *,
+    placed: Sequence[Part], title: str, dimensions: Mapping[str, Array] | None = None, *,
     names: bool = True, span: float = 0.0,
 ) -> Markup:  # fmt: skip
     """Draw a mechanism as SVG in the colours of the page, from a corner if it is spatial, otherwise from the front.
 
     ``dimensions`` are the ends of lengths by label, (2, 3) each; ``span`` is the least width of the picture in length.
     """
-    parts = [
-        replace(one.part, joints={name: path + one.shift for name, path in one.part.joints.items()}) for one in placed
-    ]
+    parts = [replace(part, joints={name: path + part.shift for name, path in part.joints.items()}) for part in placed]
     flat = np.vstack([path for part in parts for path in part.joints.values()])
-    view = scene.projection("space" if scene.is_spatial([one.part for one in placed]) else "xy")
+    view = scene.projection("space" if scene.is_spatial(placed) else "xy")
     flat = flat[np.isfinite(flat).all(axis=1)] @ view.T
     low, wide = flat.min(axis=0), np.ptp(flat, axis=0)
     scale = (WIDE - 2.0 * ROOM) / max(float(wide[0]), float(wide[1]) / 0.8, span, 1e-300)
@@ -173,8 +171,8 @@ def bars(data: Dataset) -> list[tuple[str, str, list[str]]]:
     if row is None or not rods:
         return []
     placed = drawn_parts(family, {name: value_of(row, name) for name in family.parameter_names})
-    pose, lengths = scene.first_pose([one.part for one in placed]) if placed else 0, {}
-    for part in (one.part for one in placed):
+    pose, lengths = scene.first_pose(placed) if placed else 0, {}
+    for part in placed:
         for link in (link for link in part.links if len(link.joints) > 1):
             first, second = (part.joints[name][pose] for name in link.joints[:2])
             lengths[(part.member, f"{link.name.replace(' ', '_')}{part.stage}")] = float(np.linalg.norm(second - first))

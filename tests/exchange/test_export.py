@@ -247,7 +247,7 @@ def test_mujoco_moves_the_members_of_a_machine_together(tmp_path):
 
 
 def shift_of(part, machine, design):
-    (one,) = (one for one in turn(machine, design, 0.0, 120) if one.part.member == part.member)
+    (one,) = (one for one in turn(machine, design, 0.0, 120) if one.member == part.member)
     return one.shift
 
 
