@@ -69,6 +69,17 @@ class ChunkFile:
             raise StoreError(f"{self.path}: damaged chunk; {REMEDY}")
         return _opened(self, pa.BufferReader(data))
 
+    def opened(self) -> tuple[pq.ParquetFile, dict[str, Any]]:
+        """Open the file, and return it with its metadata (see `about`); its rows are not read.
+
+        Raises
+        ------
+        StoreError
+            if the metadata cannot be read, or belong to another chunk than the name says.
+        """
+        self.check_file()
+        return _opened(self, self.path)
+
     def rows(self) -> pd.DataFrame:
         """Return all rows, after the checks of `read`."""
         rows: pd.DataFrame = self.read()[0].read().to_pandas()
@@ -96,8 +107,7 @@ def about(part: ChunkFile) -> dict[str, Any]:
     StoreError
         if the metadata cannot be read, or belong to another chunk than the name says.
     """
-    part.check_file()
-    return _opened(part, part.path)[1]
+    return part.opened()[1]
 
 
 def _opened(part: ChunkFile, source: Path | pa.BufferReader) -> tuple[pq.ParquetFile, dict[str, Any]]:
@@ -202,10 +212,10 @@ def check_columns(chunks: Sequence[ChunkFile], schemas: Iterable[pa.Schema] = ()
     Raises
     ------
     StoreError
-        for the first chunk with other columns; the message names those that differ.
+        for the first chunk that cannot be opened or has other columns; the message names those that differ.
     """
     expected: list[str] = []
-    for part, schema in zip(chunks, schemas or map(_schema, chunks), strict=True):
+    for part, schema in zip(chunks, schemas or (part.opened()[0].schema_arrow for part in chunks), strict=True):
         columns = schema.names
         expected = expected or columns
         if columns != expected:
@@ -214,18 +224,6 @@ def check_columns(chunks: Sequence[ChunkFile], schemas: Iterable[pa.Schema] = ()
             raise StoreError(
                 f"{part.path}: other columns than {chunks[0].path.name} ({differing}); move it away, then run again"
             )
-
-
-def _schema(part: ChunkFile) -> pa.Schema:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    part.check_file()
-    try:
-        with store_errors(part.path):
-            return pq.read_schema(part.path)
-    except (pa.ArrowException, ValueError) as error:
-        raise StoreError(f"{part.path}: damaged chunk; {REMEDY}") from error
 
 
 def missing_chunks(folder: Path, chunks: list[ChunkFile]) -> list[int]:

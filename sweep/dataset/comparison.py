@@ -193,8 +193,6 @@ def compare(old: str | Path, new: str | Path, rtol: float = 0.0, slower: float =
 
 
 def _columns(chunks: Sequence[chunk_files.ChunkFile]) -> list[str]:
-    for part in chunks:
-        chunk_files.about(part)
     chunk_files.check_columns(chunks)
     return [name for name in chunks[0].read()[0].schema_arrow.names if not is_error(name)]
 

@@ -57,8 +57,6 @@ def scan(folder: str | Path) -> ds.Dataset:
     import pyarrow.dataset as ds
 
     _, chunks = store.parts_of_one_table(folder, "scan")
-    for part in chunks:
-        chunk_files.about(part)
     chunk_files.check_columns(chunks)
     return ds.dataset([str(part.path) for part in chunks], format="parquet")
 

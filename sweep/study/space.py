@@ -154,14 +154,8 @@ class DesignSpace:
         return [k for k, axis in enumerate(self.axes) if axis.name in names]
 
     def _lattice(self, index: NDArray[np.int64], wanted: Sequence[int]) -> list[Array]:
-        columns: list[Array] = []
-        for k in reversed(range(len(self.axes))):
-            values = self.axes[k].values
-            assert values is not None
-            index, digit = np.divmod(index, values.size)
-            if k in wanted:
-                columns.append(values[digit])
-        return columns[::-1]
+        digits = np.unravel_index(index, [axis.count for axis in self.axes]) if wanted else ()
+        return [values[digits[k]] for k in wanted if (values := self.axes[k].values) is not None]
 
     @cached_property
     def _sequence(self) -> Sobol:
