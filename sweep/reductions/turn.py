@@ -174,16 +174,14 @@ def sampled_extrema(
             if not good.all():
                 rows, columns = rows[good], {name: values[good] for name, values in columns.items()}
             for request in asked:
-                status[_best_samples(family, rows, columns, request, samples, window, found[request])] = (
-                    st.NOT_CONVERGED
-                )
+                lacking = _best_samples(rows, columns, request, samples, window, found[request])
+                status[lacking] = st.NOT_CONVERGED
     return found, status
 
 
 def _best_samples(
-    family: Family, rows: Indices, columns: dict[str, Array], request: Request, samples: int, window: Window | None,
-    found: Extremum,
-) -> Indices:  # fmt: skip
+    rows: Indices, columns: dict[str, Array], request: Request, samples: int, window: Window | None, found: Extremum
+) -> Indices:
     """Write the extreme sample of designs and its crank angle; return the designs without a sample in the window."""
     allowed = None
     if window is not None and request.windowed:

@@ -211,7 +211,7 @@ class Curves:
             move[peak] = -slope[peak] / curvature[peak]
             climb = stationary & ~peak
             move[climb] = np.copysign(stride, points.sense * slope)[climb]
-            self._approach_edges(points, phi, position, position_slope, move)
+            self._approach_edges(points, position, position_slope, move)
             # A step that changes sign has passed the extremum: halve the longest step of that point.
             longest[previous * move < 0.0] *= 0.5
             previous = move
@@ -273,7 +273,7 @@ class Curves:
             position[mask] = columns[self.series[n].output][0, k : 2 * k][mask]
         return slopes[1], curvature, position.imag / STEP, position.real, value
 
-    def _approach_edges(self, points: Points, phi: Array, position: Array, position_slope: Array, move: Array) -> None:
+    def _approach_edges(self, points: Points, position: Array, position_slope: Array, move: Array) -> None:
         for n in np.unique(points.series[points.kind == scanned.CROSSING]):
             crossing = (points.kind == scanned.CROSSING) & (points.series == n)
             low, high = self.stroke(points, n)

@@ -162,7 +162,7 @@ def advance(
     should_stop, plan = Deadline(settings.time_budget, stop), steps(front.given)
     for number in range(front.taken, len(plan)):
         step = plan[number]
-        designs = _step_starts(front, step, number, starts_of[step.target])
+        designs = _step_starts(front, step, starts_of[step.target])
         if designs is not None:
             result = _search(problem, settings, front.bounds[step.target], designs, should_stop, jobs)
             front = _with_result(front, step, number, result)
@@ -281,7 +281,7 @@ def gaps(bounds: Array, reached: Array, values: Array) -> list[FrontGap]:
     return sorted(fillable, key=lambda gap: (-gap.area, gap.number))
 
 
-def _step_starts(front: FrontSearch, step: FrontStep, number: int, starts: Array) -> Array | None:
+def _step_starts(front: FrontSearch, step: FrontStep, starts: Array) -> Array | None:
     """Return the starting designs of a step, or None if the neighbour offers nothing new."""
     neighbour = front.results[step.neighbour] if 0 <= step.neighbour < len(front.bounds) else None
     if step.first:
