@@ -8,6 +8,7 @@ from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from sweep.errors import InputError
@@ -28,7 +29,6 @@ from sweep.report.live import lowest, without_jumps
 from sweep.report.quantities import LENGTHS, quantity
 
 if TYPE_CHECKING:
-    import pandas as pd
     from matplotlib.axes import Axes
 
 
@@ -95,8 +95,6 @@ def motion(
     >>> [panel.get_title(loc="left") for panel in axes]
     ['displacement s, from its lowest [mm]', 'acceleration s″ [mm/rad²]']
     """
-    import pandas as pd
-
     family = find_family(mechanism)
     if isinstance(family.domain, Interval):
         raise InputError("mechanism", family.name, "a mechanism that turns: this one runs over an interval", "plot")

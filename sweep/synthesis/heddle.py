@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
+import pandas as pd
 
 from kernels import status as st
 from kernels.synthesis import heddle as kernels
 from sweep.errors import InputError
 from sweep.evaluation.tables import Sheet, Table, design_matrix, index_of, refuse_rows
 from sweep.families.base import Array, Parameter
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 Mode = Literal["exact", "printed"]
 ANGLES = {"mu", "xi_1", "xi_2", "lever_angle_1", "lever_angle_2", "lever_swing"}
@@ -199,8 +196,6 @@ def arms(table: Table) -> pd.DataFrame:
 
 def _frame(columns: Mapping[str, np.ndarray], index: pd.Index) -> pd.DataFrame:
     """Return columns with units: angles by their names, all others but number and status are lengths."""
-    import pandas as pd
-
     frame = pd.DataFrame(columns, index=index)
     units = {name: "rad" if name in ANGLES else "length" for name in columns if name != "status"}
     frame.attrs["units"] = units | ({"rod": "1"} if "rod" in columns else {})

@@ -6,9 +6,8 @@ replace crank-rockers with the same limit positions, with two revolutes at the c
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from kernels import status as st
 from kernels.families import five_link, rssr
@@ -22,10 +21,6 @@ from sweep.evaluation.tables import Sheet, Table, design_matrix, index_of, param
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
 from sweep.synthesis.locus import Locus, LocusSolutions, locus
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
 _EXACT = Accuracy(target=1e-12)
@@ -63,8 +58,6 @@ def central_slots(table: Table) -> pd.DataFrame:
     InputError
         for a missing or misspelt column, a bad number, a phi0 outside (0, pi).
     """
-    import pandas as pd
-
     matrix, _ = design_matrix(CENTRAL_SLOT, table)
     phi0, e, f, alpha = matrix.T.copy()
     refuse_rows(~((phi0 > 0.0) & (phi0 < np.pi)), phi0, "phi0", "an angle between 0 and pi")
@@ -129,8 +122,6 @@ def synthesise(
     0  12.59  246.56  159.28    -1.0              0
     1  18.51  173.10   92.09    -1.0              0
     """
-    import pandas as pd
-
     if max_pressure_angle is not None and angles == "deg":
         max_pressure_angle = np.radians(max_pressure_angle)
     if max_pressure_angle is not None and not 0.0 < max_pressure_angle <= 0.5 * np.pi:
@@ -183,8 +174,6 @@ def _limits(form: Locus, solved: LocusSolutions, amplitude: Array) -> dict[str, 
 
 def _verdict(family: str, solved: LocusSolutions, limit: float | None) -> dict[str, object]:
     """Return tests (iv) and (v) of the mechanisms that passed the first three."""
-    import pandas as pd
-
     status, failed = solved.status.copy(), solved.failed.copy()
     alive = np.flatnonzero(status == st.OK)
     margin, angle = np.full(len(status), np.nan), np.full(len(status), np.nan)
@@ -221,8 +210,6 @@ def five_links_with_limits(table: Table, h: float) -> pd.DataFrame:
     InputError
         for a table that is no table of crank-rockers.
     """
-    import pandas as pd
-
     designs, _ = design_matrix(find_family("rssr"), table)
     n = len(designs)
     rssr_status, limits = np.empty(n, np.uint8), np.empty((n, len(rssr.LIMIT_NAMES)))

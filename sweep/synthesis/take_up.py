@@ -9,20 +9,16 @@ parameters in six combinations, (28) of docs/takeup.md.  Fixing e, a or alpha re
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
 
 from kernels.families import eyelet
 from sweep.errors import InputError
 from sweep.evaluation.tables import Table, design_matrix, numbers, parameter_units, refuse_rows
 from sweep.families import family
 from sweep.families.base import Array
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import ArrayLike
-
 
 # The columns of kernels.families.eyelet.length_sensitivities, in the order of the design matrix.
 SOUGHT = ("a", "e", "f", "alpha", "Z1", "Z2", "phi_h")
@@ -76,8 +72,6 @@ def fit_eyelet(
     The length itself is fitted, not the weighted difference (27) of the source, which over-weights the points with
     two long parts of the thread.  A mirror image, or an exchange of the guides, is an equally good answer.
     """
-    import pandas as pd
-
     angles, wanted = numbers(phi, "phi", "phi").ravel(), numbers(P, "P", "P").ravel()
     weight = np.ones(angles.size) if weights is None else numbers(weights, "weights", "weights").ravel()
     if not angles.size == wanted.size == weight.size:

@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from sweep.errors import InputError
 from sweep.evaluation.tables import Table
 from sweep.evaluation.thread.rows import Sheet, columns_of
 from sweep.families.base import Array, Parameter
 from sweep.families.machines.thread_balance import ALPHA, BENDING, BETA, COUNT, DENSITY, RADIUS, REFERENCE_SPEED
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 CONTOUR = ("alpha", "beta", "B")
 SPEED = ("K", "n")
@@ -144,7 +140,6 @@ def _fitted(
     names: tuple[str, ...], law: Callable[[Array], Array], slopes: Callable[[Array], Array], start: Array, count: int,
     most: Array, confidence: float,
 ) -> ConstantsFit:  # fmt: skip
-    import pandas as pd
     from scipy.optimize import least_squares
     from scipy.stats import t as student
 

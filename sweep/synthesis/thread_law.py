@@ -6,17 +6,15 @@ The equation numbers are those of docs/takeup.md, section 9.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from kernels.types import Array
 from sweep.errors import InputError
 from sweep.evaluation.tables import numbers
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import ArrayLike, NDArray
 
 DIRECTIONS = 720  # directions around the straight thread in which the edge is sought
 ROUNDS = 20  # rounds of Newton's method for the edge
@@ -134,8 +132,6 @@ def cam_edge(law: ThreadLaw, guides: ArrayLike, P_h: float, count: int = 360) ->
     InputError
         if the thread is too short, no edge gives the law, or the edge would cut into itself, with the angle.
     """
-    import pandas as pd
-
     ends = numbers(guides, "guides", "guides").reshape(2, 3)
     if not ends[0, 2] * ends[1, 2] < 0.0:
         raise InputError("guides", ends[:, 2].tolist(), "one on either side of the plane z = 0 of the cam", "cam edge")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from kernels.types import TWO_PI
 from sweep.errors import InputError
@@ -16,9 +15,6 @@ from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.curve_features import switches
 from sweep.families.machines.thread_balance import MEASURED_SPEED, MM_PER_M, ThreadBalance
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 BESIDE = 1e-9  # rad, from an event to the angles just before and after it
 COLUMNS = ("demand", "given", "surplus", "tension", "velocity")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
 
 from kernels.effects.thread import guide_line, thread_over_point
 from kernels.families import eyelet as eyelet_kernels
@@ -16,9 +15,6 @@ from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, mat
 from sweep.families.base import Array, Parameter
 from sweep.families.eyelet import PARAMETERS as EYELET_PARAMETERS
 from sweep.families.free_cam import PARAMETERS as FREE_CAM_PARAMETERS
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def _lengths(names: str, text: str, default: float | None = None) -> tuple[Parameter, ...]:

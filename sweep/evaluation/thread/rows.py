@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from sweep.errors import MeasuredRangeWarning
 from sweep.evaluation.angles import in_radians
@@ -14,9 +14,6 @@ from sweep.evaluation.tables import Parametrised, Table, design_matrix
 from sweep.evaluation.tables import Sheet as Sheet
 from sweep.families.base import Array, Parameter
 from sweep.families.machines.thread_balance import Range
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def columns_of(sheet: Parametrised, table: Table) -> dict[str, Array]:
@@ -37,8 +34,6 @@ def frame(
 
     Keys of ``units`` are units, values the names of the columns in that unit, separated by blanks.
     """
-    import pandas as pd
-
     index = table.index if isinstance(table, pd.DataFrame) else None
     result = pd.DataFrame({name: np.asarray(x).reshape(len(x)) for name, x in columns.items()}, index=index)
     result.attrs["units"] = {name: unit for unit, names in units.items() for name in names.split()}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
 
 from kernels.effects.thread import (
     CONTOUR_COLUMNS,
@@ -20,10 +20,6 @@ from sweep.evaluation.tables import Table, numbers, refuse_rows
 from sweep.evaluation.thread.rows import Sheet, columns_of, computed, frame, matrix_of, warn_outside
 from sweep.families.base import Parameter
 from sweep.families.machines import thread_balance
-
-if TYPE_CHECKING:
-    import pandas as pd
-    from numpy.typing import ArrayLike
 
 TENSION = Parameter("T1", "none", "tension in front of the contour, gf", not_negative=True)
 ANGLE = Parameter("theta_deg", "none", "wrap angle, degrees", not_negative=True)

@@ -214,10 +214,9 @@ def _restored(scaled: _Scaled, z: Array) -> Array:
         active = value.limits < 1e-10
         return np.concatenate([slope.equations, np.where(active, slope.limits, 0.0)], axis=1).T
 
-    run: Any = least_squares
     if not np.isfinite(scaled.rows(inside).equations).all():
         return z
-    result = run(
+    result = least_squares(
         residuals, inside, jac=jacobian, bounds=(low, high), xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=LOOKS
     )
     point: Array = result.x
