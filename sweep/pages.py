@@ -6,9 +6,10 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 if TYPE_CHECKING:
     from jinja2 import Environment
-    from markupsafe import Markup
 
 TEMPLATES = Path(__file__).resolve().parent / "templates"
 
@@ -17,7 +18,6 @@ TEMPLATES = Path(__file__).resolve().parent / "templates"
 def environment() -> Environment:
     """Environment of the templates; values are escaped in HTML, and an undefined name is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
-    from markupsafe import Markup
 
     found = Environment(
         loader=FileSystemLoader(TEMPLATES),
@@ -32,6 +32,4 @@ def environment() -> Environment:
 
 def rendered(template: str, **names: Any) -> Markup:
     """Render a template; all names that it uses must be given, and ``files`` inserts template files verbatim."""
-    from markupsafe import Markup
-
     return Markup(environment().get_template(template).render(**names))

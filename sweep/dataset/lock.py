@@ -8,13 +8,11 @@ import os
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+from filelock import BaseFileLock, FileLock, SoftFileLock, Timeout, lock_descriptor
 
 from sweep.dataset.files import LOCK, beside, read_runs, store_errors
 from sweep.errors import LinksweepWarning, LockedError
-
-if TYPE_CHECKING:
-    from filelock import BaseFileLock
 
 # Suffix of a file whose existence is the lock.
 SOFT = "-soft"
@@ -72,8 +70,6 @@ def held(folder: Path, file: Path, taken: Callable[[], str]) -> Iterator[None]:
 
 
 def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLock:
-    from filelock import FileLock, SoftFileLock, Timeout
-
     lock: BaseFileLock = FileLock(path, timeout=0, fallback_to_soft=False)
     try:
         try:
@@ -95,8 +91,6 @@ def _acquired(folder: Path, path: Path, taken: Callable[[], str]) -> BaseFileLoc
 
 def _hold(folder: Path, taken: Callable[[], str], locks: contextlib.ExitStack) -> None:
     """Lock the folder itself until ``locks`` ends; nothing where the system cannot lock folders."""
-    from filelock import lock_descriptor
-
     if os.name == "nt":  # Windows opens no folders
         return
     descriptor = os.open(folder, os.O_RDONLY)

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from markupsafe import Markup
 
 from kernels import status as codes
 from sweep.dataset.chunk_files import ROWS_PER_BATCH, batches
@@ -38,10 +40,6 @@ from sweep.report.scan import Cells, Scan, most_telling
 from sweep.report.sewing import diagram_of_dataset, sewn, threads_figure
 from sweep.report.sketch import bars, dimensioned, drawn_parts, sketch
 from sweep.study import Study
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
-
 
 COMPARISON = "comparison.html"
 STEPS = 4  # steps of a report: rows, figures, optima and yield, page

@@ -9,9 +9,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 
 from sweep.errors import InputError
 from sweep.evaluation.joints import Part
@@ -21,9 +21,6 @@ from sweep.pages import rendered
 from sweep.report.dataset import Dataset
 from sweep.report.quantities import quantity
 from sweep.report.tables import value_of
-
-if TYPE_CHECKING:
-    from markupsafe import Markup
 
 POSES, FAINT = 180, 7  # poses of the paths; number of faint positions
 WIDE, ROOM = 540.0, 36.0  # width of the picture and of its border, in pixels
