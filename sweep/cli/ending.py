@@ -13,14 +13,12 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.chunks.plan import spread_designs
-from sweep.dataset import files
 from sweep.dataset.reading import best
 from sweep.errors import INFEASIBLE, how_many
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Angles, Interval
 from sweep.families.capabilities import Assembly
-from sweep.optimise import read_survey
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.multistart.survey import optima_words
 from sweep.quantities.limits import compared
@@ -67,8 +65,7 @@ def ending(folder: Path) -> Ending:
     if optimum is not None:
         missed = int(optimum.get("status", 0)) == codes.LIMIT_EXCEEDED
         lines += _nearest(data) if missed else _optimum(data)
-        survey = read_survey(files.beside(folder) / files.OPTIMUM)
-        if survey is not None:
+        if (survey := data.survey) is not None:
             lines.append(f"search: {how_many(survey.starts, 'start')}, {search_words(data, survey)}")
             kinds = [f"{words}: {how_many(n, 'start')}, {optima_words(b)}" for words, n, b in survey.kinds]
             lines += [f"by listed values: {'; '.join(kinds)}"] if kinds else []
@@ -143,8 +140,8 @@ def _cannot_meet(data: Dataset) -> list[str]:
     family, loops = data.study.family, data.study.family.every(Assembly)
     if not loops or isinstance(family.domain, Interval):
         return []
-    table = files.read_table(files.beside(data.folder) / files.OPTIMUM)
-    designs = table.loc[table["role"] != "reference", [*family.parameter_names]].to_numpy(np.float64)
+    assert data.optima is not None
+    designs = data.optima.loc[data.optima["role"] != "reference", [*family.parameter_names]].to_numpy(np.float64)
     with np.errstate(all="ignore"):
         poses = family.poses(
             designs, Angles.of(np.asarray(TURN[None, :], np.float64)), frozenset(loop.discriminant for loop in loops)

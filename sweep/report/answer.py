@@ -36,7 +36,7 @@ def answer(data: Dataset, scanned: Scan, further: Sequence[str] = ()) -> list[st
     """Return the sentences that answer the study's question, most important first; ``further`` before the limits."""
     total = data.designs
     if data.result is None:
-        stops = max(tables.fates(data, scanned)[:-1], key=lambda fate: fate.count, default=None)
+        stops = max(tables.fates(data)[:-1], key=lambda fate: fate.count, default=None)
         most = [] if stops is None else [f"What stops most of them, {_count(stops.count)}: {stops.text}."]
         return [f"No design of the {_count(total)} in the sweep meets all limits.", *most]
     cut = data.front_steps is not None or (data.survey is not None and data.survey.ended == "time")

@@ -102,7 +102,7 @@ def write_report(folder: str | Path, out: str | Path | None = None, say: Say = u
             outputs=tables.output_rows(data),
             parameters=tables.parameter_rows(data),
             bars=bars(data),
-            fates=tables.fates(data, scanned),
+            fates=tables.fates(data),
             errors=tables.error_rows(data, scanned),
             provenance=tables.provenance(data),
             front=Front.of(data),

@@ -92,7 +92,6 @@ class Scan:
     scatter: Array = field(default_factory=lambda: np.empty((0, 2)))
     front: Array = field(default_factory=lambda: np.empty((0, 2)))
     errors: dict[str, tuple[float, float]] = field(default_factory=dict)
-    counts: dict[int, int] = field(default_factory=dict)
 
 
 def divided_axes(study: Study, feasible: int) -> list[Cells]:
@@ -147,8 +146,6 @@ def scan(
         names = list(rows.schema.names)
         batch = {name: np.asarray(rows[name], np.float64) for name in names}
         ok = batch["status"] == 0
-        for code, count in zip(*np.unique(batch["status"], return_counts=True), strict=True):
-            result.counts[int(code)] = result.counts.get(int(code), 0) + int(count)
         offset = -result.rows % stride
         result.rows += ok.size
         if objective is not None:

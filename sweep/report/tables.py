@@ -224,9 +224,9 @@ def _few_values(study: Study, name: str) -> list[float] | None:
     return None if axis is None or axis.values is None or not listed or axis.count > FEW else axis.values.tolist()
 
 
-def fates(data: Dataset, scanned: Scan) -> list[Fate]:
+def fates(data: Dataset) -> list[Fate]:
     """Return the number of designs per status in the order of the sweep's checks, feasible ones last."""
-    counts = data.counts or scanned.counts
+    counts = data.counts
     order = [codes.INVALID_INPUT, codes.NOT_ADMISSIBLE, codes.NOT_ASSEMBLED, codes.NOT_ROTATABLE, codes.UNDECIDABLE]
     failed = sorted(
         (c for c in counts if c != codes.OK), key=lambda c: order.index(c) if c in order else len(order) + c

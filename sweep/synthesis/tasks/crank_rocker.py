@@ -79,14 +79,12 @@ def outputs_of(designs: Array, names: Iterable[str], accuracy: Accuracy) -> dict
     return columns
 
 
-def least_cos2(designs: Array) -> Array:
-    """Return the smallest cos^2 of the pressure angle over the turn, exact; nan if there is no mechanism."""
-    return outputs_of(designs, ["margin"], _EXACT)["margin"]
-
-
 def pressure_limit(designs: Array, largest: float) -> Array:
-    """Return the slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 requires a full turn only."""
-    slack: Array = least_cos2(designs) - np.cos(largest) ** 2
+    """Return the slack of the limit on the pressure angle, cos^2 - cos^2[largest]; pi/2 requires a full turn only.
+
+    The smallest cos^2 over the turn is exact; nan if there is no mechanism.
+    """
+    slack: Array = outputs_of(designs, ["margin"], _EXACT)["margin"] - np.cos(largest) ** 2
     return slack
 
 

@@ -9,16 +9,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from kernels.types import TWO_PI
 from sweep.errors import InputError, choices
 from sweep.families.base import Array
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
 Bounds: TypeAlias = Mapping[str, tuple[float, float]]
 Rule: TypeAlias = tuple[str, Callable[[Any], bool]]
@@ -65,7 +62,7 @@ RULES: dict[str, Rule] = {
 }
 
 
-def check_given(task: DataclassInstance) -> None:
+def check_given(task: SynthesisTask) -> None:
     """Check every given field of a task that has a rule; None is "not given".
 
     Raises
