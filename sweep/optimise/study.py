@@ -175,7 +175,8 @@ def optimise_study(
     say("tables", 1, 3, "tables")
     write(results_folder / files.CURVES, _curves(study, frame), study)
     say("tables", 2, 3, "tables")
-    write(results_folder / files.SENSITIVITY, _by_role(study, frame, sensitivity), study)
+    slopes = _by_role(study, frame, lambda design: sensitivities(study.family, design, study.want, study.window))
+    write(results_folder / files.SENSITIVITY, slopes, study)
     for name in (files.TOLERANCE, files.MADE):
         (results_folder / name).unlink(missing_ok=True)
     stopped = survey.ended == "interrupted"
@@ -277,7 +278,7 @@ def _write_made(
     for k in shown[1:]:
         table["yield"][k] = sampler.share(designs[k], limits)
     sample = manufactured(study, designs[0], sampler, columns)
-    rows = _by_role(study, table, lambda _, design: tolerance_rows(sampler, design, study.want, study.output_limits))
+    rows = _by_role(study, table, lambda design: tolerance_rows(sampler, design, study.want, study.output_limits))
     write(folder / files.TOLERANCE, rows, study)
     if sample is not None:
         columns = {sample.output: sample.values, "kept": sample.kept}
@@ -297,37 +298,26 @@ def _reference(study: Study, problem: Problem) -> tuple[Array, float]:
 
 
 def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
-    """Return pose curves of optimum and reference over one turn; no rows if the study wants none."""
-    selected = [k for k, role in enumerate(table["role"]) if role in ("optimum", "reference")]
-    designs = np.array([[table[name][k] for name in study.family.parameter_names] for k in selected])
-    columns = curves(study, designs.reshape(len(selected), len(study.family.parameters)))
-    count = len(columns["status"]) // POSES
-    return {"role": np.repeat([table["role"][k] for k in selected[:count]], POSES)} | columns
-
-
-def curves(study: Study, designs: Array) -> Columns:
-    """Return curves of designs (k, P) over one turn, stacked by design; none if the study wants none."""
+    """Return pose curves of optimum and reference over one turn, one below the other; none if the study wants none."""
     family = study.family
+    shown = study.output.curves != "none" and not isinstance(family.domain, Interval)  # an interval has no turn
+    selected = [k for k, role in enumerate(table["role"]) if shown and role in ("optimum", "reference")]
+    designs = np.array([[table[name][k] for name in family.parameter_names] for k in selected])
     wanted = [*motion_curves(family), *joint_curves(family)]
-    if study.output.curves == "none" or isinstance(family.domain, Interval):  # an interval has no turn
-        designs = designs[:0]
     phi: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
+    designs = designs.reshape(len(selected), len(family.parameters))
     columns = family.poses(designs, Angles.of(phi[None, :]), frozenset(wanted))
-    return {"phi": np.tile(phi, len(designs))} | {name: columns[name].ravel() for name in [*wanted, "status"]}
+    heads = {"role": np.repeat([table["role"][k] for k in selected], POSES), "phi": np.tile(phi, len(selected))}
+    return heads | {name: columns[name].ravel() for name in [*wanted, "status"]}
 
 
-def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Study, Array], dict[str, list[Any]]]) -> Any:
+def _by_role(study: Study, table: dict[str, Any], rows_of: Callable[[Array], dict[str, list[Any]]]) -> Any:
     """Return the rows of a table about the optimum, followed by those about the reference."""
     rows: dict[str, list[Any]] = {"role": []}
     for k, role in enumerate(table["role"]):
         if role in ("optimum", "reference"):
-            part = rows_of(study, np.array([table[name][k] for name in study.family.parameter_names], np.float64))
+            part = rows_of(np.array([table[name][k] for name in study.family.parameter_names], np.float64))
             rows["role"] += [role] * len(part["output"])
             for name, values in part.items():
                 rows.setdefault(name, []).extend(values)
     return rows
-
-
-def sensitivity(study: Study, design: Array) -> dict[str, list[Any]]:
-    """Return the derivatives of the wanted outputs by the dimensions of a design (P,)."""
-    return sensitivities(study.family, design, study.want, study.window)
