@@ -117,9 +117,11 @@ def force_name(scene: Scene) -> str:
     return "force_d"
 
 
-def _drive(scene: Scene, load: Array) -> Array:
-    """Load of the follower, speed of the crank and its rate for the kernels, (n, m or 1, 3)."""
-    return np.stack(np.broadcast_arrays(load, *scene.crank()), axis=2)
+def _loading(scene: Scene, load: Array, reduced: bool) -> tuple[Loading, Array | None]:
+    """Bodies, loads, speed and tool for the kernels, and the reduced inertia of the tool if that is asked for."""
+    drive = np.stack(np.broadcast_arrays(load, *scene.crank()), axis=2)
+    tool = weighs(scene, drive, reduced)
+    return Loading(_bodies(scene), drive, tool.coupler, tool.follower), tool.inertia
 
 
 def _bodies(scene: Scene) -> Array:
@@ -141,12 +143,10 @@ def frictionless(scene: Scene, load: Array, wanted: frozenset[str], status: Stat
     sizes = zip((18, 2, 2), groups, strict=True)
     forces, couples, inertia = (np.empty((*scene.shape, size)) if asked else None for size, asked in sizes)
     on_frame = loads.frame_room(scene.shape, wanted)
-    drive = _drive(scene, load)
-    tool = weighs(scene, drive, inertia is not None)
-    given = Loading(_bodies(scene), drive, tool.coupler, tool.follower)
+    given, of_tool = _loading(scene, load, inertia is not None)
     kinetostatics(*scene.records, scene.inputs["finger"], given, status, forces, couples, inertia, *on_frame)
-    if inertia is not None and tool.inertia is not None:
-        inertia += tool.inertia
+    if inertia is not None and of_tool is not None:
+        inertia += of_tool
     if forces is not None:
         scene.memo["reactions"] = forces, status
     columns = _vector_columns(forces, wanted) | loads.frame_columns(on_frame, wanted)
@@ -172,9 +172,7 @@ def with_friction(scene: Scene, load: Array, wanted: frozenset[str], status: Sta
             for name in _FRICTION_COLUMNS
         ]
     )
-    drive = _drive(scene, load)
-    tool = weighs(scene, drive, False)
-    given = Loading(_bodies(scene), drive, tool.coupler, tool.follower)
+    given, _ = _loading(scene, load, False)
     friction_loads(*scene.records, scene.inputs["finger"], given, data, status, forces, couples, lossy, contraction)
     columns = _vector_columns(forces, wanted, FRICTION_SUFFIX)
     on_frame = loads.frame_room(scene.shape, wanted, FRICTION_SUFFIX)

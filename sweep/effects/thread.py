@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kernels.effects.thread import capstan, thread_contour, thread_speed
@@ -20,19 +22,19 @@ BEFORE = Parameter("thread_tension", "none", "tension in front of the eyelet, gf
 CONTOUR_INPUTS = (
     BEFORE,
     Parameter("eyelet_radius", "none", "radius of the eyelet's contour, mm; measured 0.125 to 7.5", not_negative=True),
-    Parameter("thread_adhesion", "none", balance.ALPHA.text, not_negative=True, default=balance.ALPHA.default),
-    Parameter("thread_friction", "none", balance.BETA.text, not_negative=True, default=balance.BETA.default),
-    Parameter("thread_bending", "none", balance.BENDING.text, not_negative=True, default=balance.BENDING.default),
-    Parameter("thread_count", "none", balance.COUNT.text, positive=True, default=balance.COUNT.default),
-    Parameter("thread_density", "none", balance.DENSITY.text, positive=True, default=balance.DENSITY.default),
-)  # fmt: skip
+    replace(balance.ALPHA, name="thread_adhesion"),
+    replace(balance.BETA, name="thread_friction"),
+    replace(balance.BENDING, name="thread_bending"),
+    replace(balance.COUNT, name="thread_count"),
+    replace(balance.DENSITY, name="thread_density"),
+)
 SPEED_INPUTS = (
     Parameter("speed", "speed", "speed of the crank"),
     CHANGE,
     Parameter("thread_speed_ref", "none", "speed at which the tension is known, mm/s; reported 1230", positive=True,
               default=balance.MM_PER_M * float(balance.REFERENCE_SPEED.default or 0.0)),
-    Parameter("thread_speed_share", "none", balance.SHARE.text, default=balance.SHARE.default),
-    Parameter("thread_speed_exponent", "none", balance.EXPONENT.text, positive=True, default=balance.EXPONENT.default),
+    replace(balance.SHARE, name="thread_speed_share"),
+    replace(balance.EXPONENT, name="thread_speed_exponent"),
     Parameter("thread_speed_low", "none", "lowest speed of the measurements, mm/s: a slower thread counts as this fast",
               not_negative=True, default=balance.MM_PER_M * balance.MEASURED_SPEED.low),
     Parameter("thread_speed_high", "none", "highest speed of the measurements, mm/s: a faster one counts as this fast",
@@ -78,9 +80,8 @@ def _tension(scene: Scene) -> Array:
 def contour(scene: Scene, wanted: frozenset[str]) -> Columns:
     """Compute the tension after the eyelet and its components."""
     wrap, status = _wrap(scene)
-    names = ("eyelet_radius", "thread_adhesion", "thread_friction", "thread_bending", "thread_count", "thread_density")
     # The constants are per degree.
-    arguments = _tension(scene), np.degrees(wrap), scene.table(names)
+    arguments = _tension(scene), np.degrees(wrap), scene.table(tuple(p.name for p in CONTOUR_INPUTS[1:]))
     outputs = *(o.name for o in CONTOUR_OUTPUTS), "radius of the thread, which nobody asks for"
     return filled_each(thread_contour, arguments, outputs, wanted, status)
 

@@ -174,7 +174,7 @@ def _places(family: Family, matrix: Array) -> list[_Place]:
     if not isinstance(family, Chain):
         return [_Place(frame=family.name)]
     names = [f"stage {stage.number} ({stage.family.name})" for stage in stages]
-    if not family.is_placed:
+    if not stages[-1].is_placed:
         return [_Place("", str(stage.number), name) for stage, name in zip(stages, names, strict=True)]
     placed = zip(stages, family.frames(matrix), strict=True)
     return [_Place("", str(stage.number), names[0], frame) for stage, frame in placed]

@@ -15,7 +15,7 @@ import numpy as np
 from kernels.families import backrest
 from kernels.types import Array, Status
 from sweep.families.base import Angles, Family, Interval, Output, Parameter, about, parameters_of
-from sweep.families.capabilities import Fixed, Link, MovingPoint, Skeleton
+from sweep.families.capabilities import Fixed, Link, Skeleton
 from sweep.families.poses import following, guarded, poses_of
 from sweep.families.skeletons import ORIGIN, moving, parameter, standing
 
@@ -111,10 +111,7 @@ def skeleton(parameters: tuple[Parameter, ...], angle: str) -> Skeleton:
         psi = parameter(parameters, "psi", designs)
         return np.stack([-np.cos(psi), np.sin(psi), 0.0 * psi], axis=1)
 
-    def made(sizes: str, needs: tuple[str, ...], place: Callable[..., tuple[Array, Array]]) -> MovingPoint:
-        return moving(parameters, sizes, needs, place)
-
-    axis = ("x_axis", "y_axis")
+    made, axis = partial(moving, parameters), ("x_axis", "y_axis")
     return Skeleton(
         {
             "o": ORIGIN,

@@ -29,11 +29,6 @@ class Chain(Family):
 
     stages: tuple[Stage, ...] = ()
 
-    @property
-    def is_placed(self) -> bool:
-        """Whether all stages are placed in one frame."""
-        return self.stages[-1].is_placed
-
     def frames(self, designs: Array) -> list[Frame]:
         """Return the frames of all stages in that of the first."""
         return stage_frames(self.stages, designs)
@@ -102,14 +97,14 @@ def chain(families: tuple[Family, ...]) -> Chain:
     """
     place = f"chain {[f.name for f in families]}"
     for number, family in enumerate(families, start=1):
+        allowed = ""
         if not isinstance(family.domain, Turn):
             allowed = f"a family over a closed turn; {family.name} is evaluated over {family.domain.text}"
-            raise InputError(f"stage {number}", family.name, allowed, place)
-        if number < len(families) and len(family.every(Assembly)) > 1:
+        elif number < len(families) and len(family.every(Assembly)) > 1:
             allowed = f"a family of one loop; {family.name} moves one link by two cranks, so put it last"
-            raise InputError(f"stage {number}", family.name, allowed, place)
-        if number < len(families) and not family.pose_output[family.position].wraps:
+        elif number < len(families) and not family.pose_output[family.position].wraps:
             allowed = f"a family with an output angle psi; {family.name} has {family.position}, which drives no crank"
+        if allowed:
             raise InputError(f"stage {number}", family.name, allowed, place)
     stages, parameters = _numbered(families)
     last = families[-1]

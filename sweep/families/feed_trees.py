@@ -9,9 +9,8 @@ from kernels.types import Array
 from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter
 from sweep.families.link_tree import LinkBody, LinkJoint, LinkTree, Path
-from sweep.families.planar_trees import at_origin
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
-from sweep.families.skeletons import dimensions
+from sweep.families.skeletons import ORIGIN, dimensions
 
 Parameters = tuple[Parameter, ...]
 _SPIN = ("psi", "dpsi", "d2psi")
@@ -161,7 +160,7 @@ def three_leads(parameters: Parameters) -> LinkTree:
         fill=fill,
         rubs=False,
         carrier=rack,
-        tip=at_origin,
+        tip=ORIGIN.at,
     )
 
 

@@ -89,7 +89,7 @@ FAMILY = Family(
         *crank_rocker.moving_alike(as_crank_rocker, itself=True),
         replace(crank_rocker.SERIES, matrix=as_crank_rocker),
         can.OutputLink(standing(PARAMETERS, "e").at),
-        can.ToolPoint(guide.tool_point),
+        can.ToolPoint(standing(PARAMETERS, "xi", "eta").at),
         FOUR_BAR_POINTS,
         can.Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e")}, (CRANK, can.Link("coupler", ("b", "c", "m")), ROCKER)

@@ -11,9 +11,9 @@ import numpy as np
 from kernels.types import Array
 from sweep.families.base import Family, Parameter, Stage
 from sweep.families.capabilities import OutputLink, skeleton_of
+from sweep.families.skeletons import X, Z
 
 CRANKS = ("a", "a1", "o2")  # families' names of the joint on the axis of their first crank
-X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 class Frame(NamedTuple):
@@ -69,11 +69,6 @@ def tilted(rotation: Array, tilts: Array) -> Array:
     return rows
 
 
-def product(a: Array, b: Array) -> Array:
-    """Cross product of vectors, (..., 3)."""
-    return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
-
-
 def place_parameters(what: str, at: Sequence[float]) -> tuple[Parameter, ...]:
     """Make the parameters of a part's place and tilt in the machine's frame, which may have tolerances."""
     return (
@@ -104,14 +99,14 @@ def mounted(axis: TurningAxis, crank: TurningAxis, sense: Any, shift: Any, turn:
     turn : angle about the axis, from its zero, to the direction of the crank at phi = 0, (n,)
     """
     sense, shift, turn = (np.atleast_1d(x)[:, None] for x in (sense, shift, turn))
-    zero = np.cos(turn) * axis.zero + np.sin(turn) * product(axis.along, axis.zero)
+    zero = np.cos(turn) * axis.zero + np.sin(turn) * np.cross(axis.along, axis.zero)
     rotation = _triad(zero, sense * axis.along, -1) @ _triad(crank.zero, crank.along, -2)
     return Frame(rotation, axis.at + shift * axis.along - _times(rotation, crank.at))
 
 
 def _triad(zero: Array, along: Array, axis: int) -> Array:
     zero, along = np.broadcast_arrays(zero, along)
-    return np.stack([zero, product(along, zero), along], axis=axis)
+    return np.stack([zero, np.cross(along, zero), along], axis=axis)
 
 
 def crank_axis(family: Family, designs: Array) -> TurningAxis | None:

@@ -84,16 +84,6 @@ def guiding_line(designs: Array) -> tuple[Array, Array]:
     return h[:, None] * np.cross(Z, along), along
 
 
-def tool_point(designs: Array) -> Array:
-    """Guided point from the crank pin: along the coupler, across it, out of the plane; (n, 3)."""
-    return np.column_stack([designs[:, 4], designs[:, 5], 0.0 * designs[:, 5]])
-
-
-def tool_direction(designs: Array) -> Array:
-    """Return the unit vector of the guiding line, (n, 3)."""
-    return guiding_line(designs)[1]
-
-
 def _of_point(axis: str, designs: Array) -> Array:
     """Coefficients of s, dev and 1 in a coordinate of the coupler point, (n, 3)."""
     lam, h = parameter(PARAMETERS, "lam", designs), parameter(PARAMETERS, "h", designs)
@@ -146,7 +136,7 @@ FAMILY = Family(
             offset="h",
             across={"s": "dev", "ds": "ddev", "d2s": "d2dev"},
         ),
-        can.ToolPoint(tool_point, tool_direction),
+        can.ToolPoint(standing(PARAMETERS, "xi", "eta").at, line(guiding_line).axis),
         GUIDE_POINTS,
         can.Skeleton(
             {"a": ORIGIN, "d": standing(PARAMETERS, "e"), "line": line(guiding_line)},

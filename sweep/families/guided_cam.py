@@ -11,7 +11,7 @@ from sweep.families.capabilities import Fixed, Link, Skeleton, ThreadPath
 from sweep.families.curve_features import Singular
 from sweep.families.planar_trees import thread_follower
 from sweep.families.poses import following, poses_of
-from sweep.families.skeletons import Y, line, moving, parameter, standing
+from sweep.families.skeletons import Y, moving, parameter, standing
 
 _ORDERS = range(1, guided_cam.HARMONICS + 1)
 PARAMETERS = (
@@ -82,12 +82,6 @@ def cam_axis(designs: Array) -> Array:
     return np.stack([e, least - radius, np.zeros(len(designs))], axis=1)
 
 
-def follower_line(designs: Array) -> tuple[Array, Array]:
-    """Return a point and the direction of the follower's line, across the line of the guides, each (n, 3)."""
-    e = parameter(PARAMETERS, "e", designs)
-    return np.stack([e, 0.0 * e, 0.0 * e], axis=1), np.tile(np.array(Y), (len(designs), 1))
-
-
 def follower(angles: Angles, e: Array, s: Array) -> tuple[Array, Array]:
     """End of the follower, which lies on the cam and carries the thread."""
     return e, s
@@ -119,7 +113,7 @@ FAMILY = Family(
         Skeleton(
             {
                 "a": Fixed(cam_axis, standing(PARAMETERS).axis),
-                "d": line(follower_line),
+                "d": standing(PARAMETERS, "e", axis=Y, kind="slide"),
                 "n1": guide(1.0),
                 "n2": guide(-1.0),
             },

@@ -17,7 +17,6 @@ from kernels.linkage.bodies import FRAME, TURN
 from kernels.types import Array
 from sweep.families.base import Angles, Columns, Parameter, floats
 from sweep.families.capabilities import DesignMap
-from sweep.families.frames import product
 
 if TYPE_CHECKING:  # families without kernels of trees do not wait for the import
     from kernels.linkage.bodies import Links
@@ -134,14 +133,11 @@ class Turning(NamedTuple):
     def arm(self, along: Array, across: Array | float = 0.0) -> Path:
         """Return a vector that turns with the angle: parts along its direction and to its left, (n, 1) or (n, m)."""
         cos, sin = np.cos(self.angle), np.sin(self.angle)
-        at = _stacked(along * cos - across * sin, along * sin + across * cos)
-        turned = product(_Z, at)
+        x, y = along * cos - across * sin, along * sin + across * cos
+        at = np.stack([x, y, np.zeros_like(x + y)], axis=-1)
+        turned = np.cross(_Z, at)
         rate, bend = self.rate[..., None], self.bend[..., None]
         return Path(at, rate * turned, bend * turned - rate * rate * at)
-
-
-def _stacked(x: Array, y: Array) -> Array:
-    return np.stack([x, y, np.zeros_like(x + y)], axis=-1)
 
 
 def crank_angle(links: Links, angles: Angles, per: Array | float = 1.0, ahead: Array | float = 0.0) -> Turning:
@@ -189,7 +185,7 @@ def put_about(links: Links, body: int, at: Path, turned: Turning, way: Array = _
     """
     x = turned.arm(np.ones((1, 1))).at
     links.axes[:, :, _freedoms(links, body)] = way[..., None, :]
-    _put(links, body, at, x, product(_Z, x), turned.rate[..., None] * _Z, turned.bend[..., None] * _Z)
+    _put(links, body, at, x, np.cross(_Z, x), turned.rate[..., None] * _Z, turned.bend[..., None] * _Z)
 
 
 def put_shifted(links: Links, body: int, at: Path, way: tuple[float, float, float]) -> None:
@@ -203,7 +199,7 @@ def put_crank(links: Links, body: int, at: Path, arm: Path) -> None:
     """Write a crank with its first axis along its arm, and the axis that drives it."""
     x = arm.at / np.linalg.norm(arm.at, axis=-1, keepdims=True)
     y = arm.v / np.linalg.norm(arm.v, axis=-1, keepdims=True)
-    u = product(x, y)
+    u = np.cross(x, y)
     _put(links, body, at, x, y, u, np.zeros(3))
     links.axes[:, :, _freedoms(links, body)] = u[..., None, :]
 
@@ -218,17 +214,17 @@ def put_between(links: Links, body: int, start: Path, end: Path) -> None:
     square = (along.at * along.at).sum(axis=-1, keepdims=True)
     x = along.at / np.sqrt(square)
     least = np.eye(3)[np.where(np.abs(x[..., 2]) < 0.5, 2, 0)]
-    y = product(least, x)
+    y = np.cross(least, x)
     y /= np.linalg.norm(y, axis=-1, keepdims=True)
     own = _freedoms(links, body)
-    for freedom, way in zip(own, (_Z,) if len(own) == 1 else (y, product(x, y)), strict=False):
+    for freedom, way in zip(own, (_Z,) if len(own) == 1 else (y, np.cross(x, y)), strict=False):
         links.axes[:, :, freedom] = way
-    _put(links, body, start, x, y, product(along.at, along.v) / square, product(along.at, along.a) / square)
+    _put(links, body, start, x, y, np.cross(along.at, along.v) / square, np.cross(along.at, along.a) / square)
 
 
 def _put(links: Links, body: int, at: Path, x: Array, y: Array, omega: Array, eps: Array) -> None:
     record = links.bodies[:, :, body]
-    for k, part in enumerate((*at, omega, eps, x, y, product(x, y), at.at)):
+    for k, part in enumerate((*at, omega, eps, x, y, np.cross(x, y), at.at)):
         record[:, :, 3 * k : 3 * k + 3] = part
 
 

@@ -7,7 +7,6 @@ bear forces in the plane.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -16,18 +15,13 @@ from kernels.types import Array
 from sweep.families import link_tree as poses
 from sweep.families.base import Angles, Columns, Parameter, floats
 from sweep.families.link_tree import LinkBody, LinkFill, LinkJoint, LinkTree, Path, Turning
-from sweep.families.skeletons import X, Y, Z, dimensions, parameter
+from sweep.families.skeletons import ORIGIN, X, Y, Z, dimensions, standing
 
 Parameters = tuple[Parameter, ...]
 _PSI, _CHI = ("psi", "dpsi", "d2psi"), ("chi", "dchi", "d2chi")
 
 
 _GUIDE = LinkJoint("d", "guide of the follower", "sleeve", "frame on the follower", body=1)
-
-
-def at_origin(designs: Array) -> Array:
-    """Place of a tool at the origin of its body, (n, 3)."""
-    return np.zeros((len(designs), 3))
 
 
 _CAM = LinkBody("cam", "fixed to the cam, along x and y at phi = 0, along its axis, from its axis", free=(DRIVEN,))
@@ -138,7 +132,7 @@ def _cam_and(follower: LinkBody, joint: LinkJoint, needs: tuple[str, ...], fill:
         fill=fill,
         rubs=False,
         carrier=1,
-        tip=at_origin if slides else None,
+        tip=ORIGIN.at if slides else None,
         output=1,
         arms=() if slides else ((1, 0),),
     )
@@ -210,11 +204,7 @@ def eyelet_crank(parameters: Parameters) -> LinkTree:
         poses.put_crank(links, 0, centre, poses.crank_arm(links, angles, alpha, a))
 
     body = LinkBody("crank", "along the crank, tangential, along its axis, from A", free=(DRIVEN,))
-    return LinkTree((body,), (_bearing("crank"),), (), ("P",), fill, 0, partial(_on_crank, parameters), rubs=False)
-
-
-def _on_crank(parameters: Parameters, designs: Array) -> Array:
-    return np.column_stack([parameter(parameters, "a", designs), np.zeros((len(designs), 2))])
+    return LinkTree((body,), (_bearing("crank"),), (), ("P",), fill, 0, standing(parameters, "a").at, rubs=False)
 
 
 def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Array]]) -> LinkTree:
@@ -267,7 +257,7 @@ def heddle_shaft(parameters: Parameters, line: Callable[[Array], tuple[Array, Ar
         fill=fill,
         rubs=False,
         carrier=4,
-        tip=at_origin,
+        tip=ORIGIN.at,
         output=4,
         arms=((3, 3),),
     )

@@ -138,8 +138,6 @@ PLANAR_VALUES = (
 
 PLANAR_JOINTS = joint_outputs({"b": "crank pin"}, "(1)", ALONG_FRAME)
 
-planar_poses = poses_of(inverted_slider_crank.poses, inverted_slider_crank.Outputs, {"joints": PLANAR_JOINTS})
-
 
 def slot_foot(angles: Angles, h: Array, e: Array, psi: Array) -> tuple[Array, Array]:
     """Foot of the perpendicular from the rocker pivot on the slot, at the distance ``h``."""
@@ -151,7 +149,7 @@ PLANAR = Family(
     parameters=PLANAR_PARAMETERS,
     position="psi",
     pose_outputs=PLANAR_VALUES + PLANAR_JOINTS,
-    poses=planar_poses,
+    poses=poses_of(inverted_slider_crank.poses, inverted_slider_crank.Outputs, {"joints": PLANAR_JOINTS}),
     derivative_of=ladders("psi") | ladders("s", orders=2),
     points={"b": ("x_b", "y_b", None)},
     capabilities=(

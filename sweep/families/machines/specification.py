@@ -40,6 +40,7 @@ from sweep.families.machines.tools import (
     read_height,
     read_tools,
 )
+from sweep.families.names import ends_in_digit
 from sweep.families.parameter import reads_as_degrees
 from sweep.families.parts import Member, placement, vector
 from sweep.families.shafts import MOUNT_KEYS, SHAFT_KEYS, Mount, Shaft, read_mount, read_shafts, turns
@@ -55,7 +56,6 @@ READERS: dict[str, Callable[[str, Mapping[str, Any], Mapping[str, Member], Mappi
 }  # fmt: skip
 DERIVATIVES = 3  # of the angle that drives a member: its jerk needs all of them
 _WORD = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
-_ENDS_IN_DIGIT = re.compile(r".*\d")
 
 FindFamily = Callable[[str | Sequence[str]], Family]
 
@@ -153,7 +153,7 @@ def built(given: Specification, find: FindFamily) -> Machine:
     }
     relations = tuple(known[name] if name in known else events[name] for name, _ in given.relations)
     for relation in relations:
-        if not _WORD.fullmatch(relation.name) or _ENDS_IN_DIGIT.fullmatch(relation.name) or relation.name in members:
+        if not _WORD.fullmatch(relation.name) or ends_in_digit(relation.name) or relation.name in members:
             allowed = "a plain word without a digit at its end that is no member"
             raise InputError("relation", relation.name, allowed, "machine.relations")
     title = ", ".join(f"{m.name}: {m.family.name}" for m in members.values())
