@@ -32,6 +32,7 @@ LEVEL = 'what it passes, in its unit, as "1 mm"; 0 if left out'
             {"x": ["-1 mm", "2 mm"]},
             "relations.a.fields = {'x': ['-1 mm', '2 mm']}; allowed: a length",
         ),
+        ("relations.a.fields", {}, "relations.a.fields = {}; allowed: at least one field with the least and the most"),
         ("relations.b.settings", "juki-mo-104d", "relations.b.settings = 'juki-mo-104d'; allowed: nothing here"),
         (
             "relations.sews.speeds",
@@ -65,6 +66,18 @@ def test_a_fault_names_its_key_its_value_and_what_is_allowed(place, value, line)
     [
         ({"take": ["thin", "blade"]}, "tools: this machine has none"),
         ({"press": "feed"}, "a member of the family feed: this machine has none"),
+        ({"gap": 5}, "two bodies"),
+        ({"above": 5}, "two tools and points"),
+        ({"take": ["needle", 5]}, "tools: this machine has none"),
+        ({"enter": 5}, "a list of tools"),
+        (
+            {"thread": 5},
+            "points and take-ups in order, two points at least in a row; each row begins and ends with a point over "
+            "which it always runs, as between blades",
+        ),
+        ({"enter": []}, "three tools: what passes, a blade, the seam"),
+        ({"gap": ["needle.rocker", "looper.rocker"], "radii": 0.1}, "the radius of each body"),
+        ({"gap": ["needle.rocker", "looper.rocker"], "radii": [0.1, 0.2, 0.3]}, "the radius of each body"),
     ],
 )
 def test_what_a_relation_is_about_may_be_missing_from_the_machine(relation, allowed):

@@ -161,20 +161,28 @@ def check_unique(names: Sequence[str]) -> None:
         seen.add(name)
 
 
-def two_names(given: tuple[str, ...], known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
+def pair(key: str, given: object, allowed: str, where: str) -> tuple[Any, Any]:
+    """Return the two values that a user gives for a key."""
+    if not isinstance(given, tuple) or len(given) != 2:
+        raise InputError(key, given, allowed, where)
+    return given
+
+
+def two_names(given: object, known: Sequence[str] | None, what: str, where: str) -> tuple[str, str]:
     """Check that a user gives two names, among the known ones if these are given."""
-    if len(given) != 2:
-        raise InputError(what, given, f"two {what}", where)
-    first, second = given if known is None else known_names(given, known, what, where)
+    names = pair(what, given, f"two {what}", where)
+    first, second = names if known is None else known_names(names, known, what, where)
     return first, second
 
 
 NONE_HERE = "this machine has none"  # of what is allowed
 
 
-def known_names(given: tuple[str, ...], known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
-    """Check that a user's names are known."""
+def known_names(given: object, known: Sequence[str], what: str, where: str) -> tuple[str, ...]:
+    """Check that a user gives a list of known names."""
+    if not isinstance(given, tuple):
+        raise InputError(what, given, f"a list of {what}", where)
     for part in given:
         if part not in known:
-            raise InputError(what, part, f"{what}: {choices(part, known) or NONE_HERE}", where)
+            raise InputError(what, part, f"{what}: {choices(str(part), known) or NONE_HERE}", where)
     return given

@@ -13,7 +13,7 @@ from sweep.errors import InputError, choices, known_keys, number, sign
 from sweep.families.capabilities import ThreadPath
 from sweep.families.machines.main_shaft import ShaftTorque
 from sweep.families.machines.moments import RiseWindow, Taking
-from sweep.families.machines.relations import known_names, two_names
+from sweep.families.machines.relations import known_names, pair, two_names
 from sweep.families.machines.sewing import Sewing
 from sweep.families.machines.thread_balance import ThreadBalance
 from sweep.families.machines.thread_way import Edge, TakeUp, Waypoint, spots
@@ -46,16 +46,15 @@ def read_taking(
     return Taking(name, needle, blade, sense, window)
 
 
-def _rise_window(name: str, given: tuple[tuple[str, Any], ...], vary: bool, where: str) -> RiseWindow:
+def _rise_window(name: str, given: object, vary: bool, where: str) -> RiseWindow:
     """Read the least and the largest permitted rise of each field of work."""
-    fields = []
-    for field, ends in given:
-        if not isinstance(ends, tuple) or len(ends) != 2:
-            raise InputError("fields", ends, "of each field the least and the most rise", where)
-        least, most = (length("fields", end, where) for end in ends)
+    if not isinstance(given, tuple) or not given:
+        raise InputError("fields", given or {}, "at least one field with the least and the most rise", where)
+    fields, allowed = [], "of each field the least and the most rise"
+    for one in given:
+        field, ends = pair("fields", one, allowed, where)
+        least, most = (length("fields", end, where) for end in pair("fields", ends, allowed, where))
         fields.append((field, least, most))
-    if not fields:
-        raise InputError("fields", {}, "at least one field with the least and the most rise", where)
     return RiseWindow(name, tuple(fields), vary)
 
 
@@ -65,18 +64,18 @@ def read_entering(
     """Read a relation ``enter``: the tool that enters, a blade, the seam, the sense and a window."""
     where = f"machine.relations.{name}"
     known_keys(table, ("enter", "sense", "window"), where)
-    if len(table["enter"]) != 3:
+    found = [tools[one] for one in known_names(table["enter"], list(tools), "tools", where)]
+    if len(found) != 3:
         raise InputError("enter", table["enter"], "three tools: what passes, a blade, the seam", where)
-    entering, blade, seam = (tools[one] for one in known_names(table["enter"], list(tools), "tools", where))
+    entering, blade, seam = found
     if not isinstance(entering, Needle | Blade) or not isinstance(blade, Blade) or not isinstance(seam, Seam):
         raise InputError("enter", table["enter"], "a needle or blade, a blade, a seam", where)
     if not (blade.eye and blade.hold):
         raise InputError("enter", blade.name, "a blade with eye and hold", where)
     window = None
     if "window" in table:
-        if not isinstance(table["window"], tuple) or len(table["window"]) != 2:
-            raise InputError("window", table["window"], "two crank angles, from and to", where)
-        start, end = (number("window", one, where) for one in table["window"])
+        both = pair("window", table["window"], "two crank angles, from and to", where)
+        start, end = (number("window", one, where) for one in both)
         window = (start, end) if end - start < TWO_PI - ROUNDED else None
     corners = (Spot(blade.eye), Spot(blade.hold), Spot(at=seam.at))
     words = "the tip passes along the normal of eye, hold, seam, or against it"
@@ -96,14 +95,15 @@ def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> S
     speeds = tuple(length("speeds", speed, where, "a speed") for speed in table.get("speeds", ()))
     if len(speeds) < 2 or any(b <= a for a, b in pairwise(speeds)):
         raise InputError("speeds", table.get("speeds"), "speeds of the main shaft, growing, at least two", where)
-    given = table.get("clearance", (0.0, 0.1))
-    if not isinstance(given, tuple) or len(given) != 2 or not given[0] <= given[1]:
-        raise InputError("clearance", given, "the least and the largest clearance at A", where)
+    between = "the least and the largest clearance at A"
+    given = pair("clearance", table.get("clearance", (0.0, 0.1)), between, where)
+    low, high = (number("clearance", end, where) for end in given)
+    if low > high:
+        raise InputError("clearance", given, between, where)
     shaft = known.get(table["shaft"]) if "shaft" in table else None
     if "shaft" in table and not isinstance(shaft, ShaftTorque):
         names = [one for one, relation in known.items() if isinstance(relation, ShaftTorque)]
         raise InputError("shaft", table["shaft"], f"a relation torque: {choices(str(table['shaft']), names)}", where)
-    low, high = (number("clearance", end, where) for end in given)
     return Sewing(name, taking[0], entering, speeds, (low, high), shaft)
 
 
@@ -119,7 +119,8 @@ def read_thread(
     """
     where = f"machine.relations.{name}"
     known_keys(table, THREAD_KEYS, where)
-    path = tuple(_place(given, members, tools, where) for given in table["thread"])
+    places = table["thread"] if isinstance(table["thread"], tuple) else ()
+    path = tuple(_place(given, members, tools, where) for given in places)
     bends = _bends(path)
     if bends is None:
         allowed = "points and take-ups in order, two points at least in a row; each row begins and ends with a point"

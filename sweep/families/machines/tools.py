@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from sweep.errors import InputError, MissingInput, choices, known_keys, number, sign
 from sweep.families.base import PER_RADIAN, Output
 from sweep.families.capabilities import OutputLink
-from sweep.families.machines.relations import Relation, two_names
+from sweep.families.machines.relations import Relation, pair, two_names
 from sweep.families.machines.segments import Capsule, Gap, dot, minus
 from sweep.families.parts import Member, vector
 from sweep.families.sites import Spot, links_of
@@ -275,6 +275,7 @@ def read_gap(name: str, table: Mapping[str, Any], members: Mapping[str, Member],
     known_keys(table, ("gap", "radii"), where)
     first, second = (known[one] for one in two_names(table["gap"], list(known), "bodies", where))
     if "radii" in table:
-        a, b = (length("radii", radius, where) for radius in table["radii"])
+        both = pair("radii", table["radii"], "the radius of each body", where)
+        a, b = (length("radii", radius, where) for radius in both)
         first, second = replace(first, radius=a), replace(second, radius=b)
     return Gap(name, (first, second))
