@@ -220,8 +220,9 @@ class ThreadBalance(Relation):
             return 0.0, 0.0
         first, last = (found[f"phi_{end}"] for end in ends)
         since, lasts = found[thread_way.PHI] - first, thread_way.turned(last - first)
-        share = thread_way.turned(since) / lasts
-        share = np.where(np.real(share) < 1.0, share, 1.0)
+        # No thread passes in no time: between events at one crank angle neither its length nor its rate is defined.
+        share = thread_way.turned(since) / np.where(np.real(lasts) > 0.0, lasts, np.nan)
+        share = np.where(np.real(share) > 1.0, 1.0, share)
         # a cycloid: thread begins to pass and ends without a jump of its speed
         passed = share - np.sin(TWO_PI * share) / TWO_PI + np.floor(np.real(since) / TWO_PI)
         whole = found[f"{self.name}_sewn"]

@@ -10,6 +10,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import sweep
+from kernels import status as st
 from sweep.errors import InputError
 from sweep.families.base import Angles
 from sweep.families.machines.thread_balance import GF
@@ -92,6 +93,16 @@ def test_demand_is_needed_with_what_is_sewn_in_and_without_what_is_drawn():
     away = demand - length
     # all is drawn from A to where the loop is cast off, and sewn in from there to A
     assert away[0] - away[1] == pytest.approx(4.0, abs=1e-9) and away[3] - away[2] == pytest.approx(4.0, abs=1e-9)
+
+
+def test_thread_that_would_pass_in_no_time_has_no_demand_and_no_rate():
+    """Its rate was refused and its demand was not, though it leapt by a whole stitch."""
+    thread = {"thread": PATH, "sewn": 4.0, "feeding": ["cast", "late"], "drawing": ["a", "cast"]}
+    made = machine_of(RELATIONS | {"late": RELATIONS["cast"], "upper": thread})
+    for name in ("demand", "surplus", "rate", "velocity"):
+        found = sweep.evaluate(made, DESIGN, [f"upper_{name}"], phi=np.linspace(0.05, 6.2, 7))
+        assert (found["status"] == st.INVALID_INPUT).all() and found[f"upper_{name}"].isna().all(), name
+    assert (sweep.evaluate(made, DESIGN, ["upper_needed"], phi=[1.0])["status"] == st.OK).all()
 
 
 def test_thread_that_slides_through_the_eye_has_275_gf_and_one_that_the_bar_carries_50():
