@@ -16,6 +16,7 @@ BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump on
 GRID, GRIDS = 9, 26  # points of each grid about a minimum; grids that narrow a whole turn down to rounding
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 SAME = 1e-9  # distance [rad] of a root from a jump below which it counts as the jump
+STILL = 1e-3  # change in a step, relative to the bend, from which on a curve at 0 does not just touch it
 FLAT = 1e-9  # width of brackets [rad] in which a smooth function is at its minimum to rounding
 
 Functions: TypeAlias = Callable[[Indices, Array], Array]
@@ -29,9 +30,15 @@ def beyond(values: Array, level: Array | float, wraps: bool) -> Array:
 
 
 def passages(off: Array, wraps: bool) -> Mask:
-    """Mark after which samples (n, m) rise through 0; an angle that ``wraps`` does not where it leaps to -pi."""
-    after = np.roll(off, -1, axis=1)
-    passes: Mask = (off < 0.0) & (after >= 0.0)
+    """Mark after which samples (n, m) rise through 0, or to 0 and stay there.
+
+    A curve that touches 0 at one sample and falls again does not, nor does an angle that ``wraps`` where it leaps to
+    -pi.  Five samples tell the skew of a touch from the slope of a curve that falls again before the next sample.
+    """
+    before, after, second, third = (np.roll(off, -k, axis=1) for k in (-1, 1, 2, 3))
+    slope = np.abs(8.0 * (second - off) - (third - before))
+    touches = (after == 0.0) & (second < 0.0) & (slope <= 12.0 * STILL * np.abs(off + second))
+    passes: Mask = (off < 0.0) & (after >= 0.0) & ~touches
     return passes & (after - off < np.pi) if wraps else passes
 
 

@@ -103,6 +103,36 @@ def test_events_over_a_turn_count_every_passage() -> None:
     assert abs(found["phi_lift"][0] - 5.0 * np.pi / 9.0) <= found["err_phi_lift"][0] <= 1e-13
 
 
+def touching(designs: Any, angles: Angles, wanted: frozenset[str]) -> dict[str, Any]:
+    """At phi = 0 all are 0: a skew top, a skew bottom, two passages, and two passages a hundredth apart."""
+    phi = angles.phi + 0.0 * designs[:, :1]
+    hill, late = 1.0 - np.cos(phi), np.cos(phi - 0.005) - np.cos(0.005)
+    values = {"top": -hill * (1.0 + 0.5 * np.sin(phi)), "bottom": hill * (1.0 + 0.5 * np.sin(phi)),
+              "wave": np.sin(phi), "pair": np.where(angles.phi == 0.0, 0.0, late)}  # fmt: skip
+    return {name: values[name] for name in wanted} | _no_status(phi.shape)
+
+
+@pytest.mark.parametrize("given", [{"accuracy": 1e-8}, {"samples": 256}, {"samples": 2048}])
+@pytest.mark.parametrize("rising", [True, False])
+def test_a_curve_that_touches_its_level_at_a_sample_does_not_pass_it(given: dict[str, Any], rising: bool) -> None:
+    """A touch at a sample counted as a passage in one of the two senses; between samples it did not."""
+    names = ("top", "bottom", "wave", "pair")
+    family = Family(
+        "touch", "", (Parameter("p", "none", "unused"),), "top", tuple(Output(name, "1", name) for name in names),
+        touching, events=tuple(Event(f"at_{name}", name, name, rising=rising) for name in names),
+    )  # fmt: skip
+    for name in ("top", "bottom") if "samples" in given else ("top",):
+        found = sweep.summarise(family, {"p": 0.0}, [f"phi_at_{name}", f"count_at_{name}"], **given)
+        assert found["status"][0] == st.NO_EVENT and found[f"count_at_{name}"][0] == 0.0
+    # The pair is a hundredth apart: its fall begins and ends between two of 256 samples.
+    for name in ("wave", "pair") if rising or given.get("samples") == 2048 else ("wave",):
+        found = sweep.summarise(family, {"p": 0.0}, [f"phi_at_{name}", f"count_at_{name}"], **given)
+        assert found["status"][0] == st.OK and found[f"count_at_{name}"][0] == 1.0
+        first = {"wave": 0.0 if rising else np.pi, "pair": 0.0 if rising else 0.01}[name]
+        # A root is found to rounding; the slope of the pair, 5e-3, makes 2e-14 of it.
+        assert abs(np.remainder(found[f"phi_at_{name}"][0] - first + 1.0, 2.0 * np.pi) - 1.0) <= 1e-12
+
+
 def friction(designs: Any, angles: Angles, wanted: frozenset[str]) -> dict[str, Any]:
     x = np.cumsum(np.ones_like(angles.phi), axis=1) + 0.0 * designs[:, :1]
     return {name: x.copy() for name in wanted} | _no_status(x.shape)
