@@ -22,7 +22,7 @@ from sweep.families.chain import drive, driving_names
 from sweep.families.curve_features import Singular, measured, samples_of_peaks, samples_of_waves
 from sweep.families.link_tree import LinkTree
 from sweep.families.names import at_stage
-from sweep.numerics.curves import Curve
+from sweep.numerics.curves import Curve, with_jumps
 from sweep.numerics.records import Indices, Mask
 from sweep.numerics.singularities import Discriminant
 
@@ -218,10 +218,10 @@ class Scene:
 
     @cached_property
     def least_samples(self) -> Array:
-        """Least number of even samples that resolves loads, waves and peaks, (n,); inf where a load jumps at a tool."""
+        """Least number of even samples that resolves loads, waves and peaks, (n,); `with_jumps` of loads at a tool."""
         of_loads = max((curve.samples for curve in self.every_curve), default=0.0)
         least = np.maximum(samples_of_waves(self.family, self.designs), of_loads)
-        return np.where(self.pierces, np.inf, np.maximum(least, samples_of_peaks(self._peaks(), len(self.designs))))
+        return with_jumps(np.maximum(least, samples_of_peaks(self._peaks(), len(self.designs))), self.pierces)
 
     def _peaks(self) -> list[Discriminant]:
         """Functions near whose zeros a link of this stage or of a later one turns abruptly."""

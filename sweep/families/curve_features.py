@@ -17,7 +17,7 @@ from kernels.types import TWO_PI, Array
 from sweep.families.base import Angles, Columns, Family, Stage, floats
 from sweep.families.capabilities import Assembly, DesignMap
 from sweep.families.parts import Member
-from sweep.numerics.curves import PER_GAP
+from sweep.numerics.curves import PER_GAP, with_jumps
 from sweep.numerics.records import Indices, Mask
 from sweep.numerics.singularities import Discriminant, singularities
 
@@ -174,7 +174,7 @@ def samples_of_peaks(curves: Sequence[Discriminant], n: int) -> Array:
 
 
 def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> Array:
-    """Return a number of even samples that resolves waves, peaks and gaps between angles, (n,); inf with a jump."""
+    """Return a number of even samples that resolves waves, peaks and gaps between angles, (n,); see `with_jumps`."""
     angles = np.sort(switches(family, designs, outputs), axis=1)
     gaps = np.diff(np.concatenate([angles, angles[:, :1] + TWO_PI], axis=1), axis=1)
     narrowest = np.where(gaps > NARROWEST, gaps, TWO_PI).min(axis=1, initial=TWO_PI)
@@ -186,7 +186,7 @@ def least_samples(family: Family, designs: Array, outputs: Collection[str]) -> A
 
     peaks = [partial(peak, known) for known in about(family, Singular, outputs)]
     least = np.maximum(least, samples_of_peaks(peaks, len(designs)))
-    return np.where(crossed(family, designs, outputs), np.inf, least)
+    return with_jumps(least, crossed(family, designs, outputs))
 
 
 def singular_curves(family: Family, outputs: Collection[str]) -> Sequence[SingularCurve]:

@@ -13,7 +13,10 @@ from kernels.types import TWO_PI, Array
 if TYPE_CHECKING:
     from scipy.interpolate import PchipInterpolator
 
+    from sweep.numerics.records import Mask
+
 PER_GAP = 4.0  # samples between two points of a table, or per period of a harmonic
+FINEST = 2049  # even samples of a turn, for curves that jump
 AROUND = 3  # points repeated from the next and the last turn: a slope depends on the two neighbours alone
 
 
@@ -112,3 +115,11 @@ def table_curve(phi: Array, values: Array) -> TableCurve:
     if phi.size < 2 or not (np.diff(phi) > 0.0).all() or not phi[-1] - phi[0] < TWO_PI:
         raise ValueError("two or more rising angles within one turn")
     return TableCurve(tuple(map(float, phi)), tuple(map(float, values)))
+
+
+def with_jumps(least: Array, jumps: Mask) -> Array:
+    """Return the least number of even samples, (n,), as inf where a curve jumps: that asks for the finest grid.
+
+    More than that grid has is kept: the gap that needs it would not be seen beside the jump.
+    """
+    return np.where(jumps & (least <= FINEST), np.inf, least)

@@ -10,13 +10,13 @@ import numpy as np
 from kernels.effects.speed_fluctuation import Uneven, speed_fluctuation
 from kernels.status import NOT_CONVERGED, OK
 from kernels.types import Array, Status
-from sweep.numerics.curves import PER_GAP
+from sweep.numerics.curves import FINEST, PER_GAP
 from sweep.numerics.records import Indices
 
 # Odd grids: the next one is tried for designs that the previous one does not resolve.
 GRIDS = (65, 129, 257)
 # For loads with jumps or kinks: no grid resolves all of them, the error estimates what the last one misses.
-FINER = (513, 2049)
+FINER = (513, FINEST)
 LEFT = 1e-3  # share of J omega^2 that the last of these grids may miss of the torque
 PER_LEFT = 5.0  # a jump h leaves h/(pi K) in harmonic K and shifts the energy by h pi/N at most, N = 2 K + 1
 ERROR = 1e-9

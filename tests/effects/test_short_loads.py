@@ -93,6 +93,23 @@ def test_loads_between_two_samples_of_the_finest_grid_are_seen_or_refused(half):
     assert sweep.summarise(machine, of_machine, ["f_moment_order1"], accuracy=1e-3, loads=wider)["status"][0] == st.OK
 
 
+def test_a_load_between_two_samples_is_refused_beside_a_tool_that_pierces():
+    """A jump asks for the finest grid whatever it resolves: the table beside it was not seen, and nothing said so."""
+    machine = sweep.machine({"n": "guide"}, {"shaft": {"torque": ["n"]}, "f": {"shaking": ["n"]}})
+    row = pierced(1e-2, 400.0)
+    of_machine = {f"n.{name}": value for name, value in row.items()}
+    for half, seen in ((1e-4, False), (0.1, True)):
+        load = ([0.0, 1.9605 - half, 1.9605, 1.9605 + half, 6.0], [0.0, 0.0, 400.0 / half, 0.0, 0.0])
+        for mechanism, given, acting, name in (
+            ("guide", row, {"load_torque": load}, "unevenness"),
+            (machine, of_machine, {"n.load_torque": load}, "shaft_unevenness"),
+            (machine, of_machine, {"n.load_torque": load}, "f_moment_order1"),
+        ):
+            # 0.1 of the order: no grid resolves a jump, and the accuracy asked is not what this is about
+            found = sweep.summarise(mechanism, given, [name], accuracy=0.1, loads=acting)
+            assert found["status"][0] == (st.OK if seen else st.NOT_CONVERGED), (name, half)
+
+
 @pytest.mark.parametrize("table", [True, False], ids=["table", "tool"])
 def test_mean_loads_of_bearings_count_short_loads(table):
     loads = {"load_torque": ([0.0, 0.497, 0.5, 0.503, 6.0], [0.0, 0.0, 40000.0, 0.0, 0.0])} if table else None
