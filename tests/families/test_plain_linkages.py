@@ -168,39 +168,40 @@ def test_inverted_slider_crank_with_a_long_crank_turns_fully():
     assert (row.max_dpsi, row.min_dpsi) == pytest.approx((2.0, 2.0 / 3.0), rel=1e-9)
 
 
-def test_geneva_drive_of_beer_and_johnston_has_the_printed_motion():
-    # Vector Mechanics, sample problems 15.9 and 15.10: pin at 50 mm, pivots 50 sqrt(2) mm apart, 10 rad/s, the pin at
-    # 30 deg from the line of pivots: 4.08 rad/s, 233 rad/s^2, 477 mm/s in the slot.  Quoted without the book at hand.
-    design = {"a": 50.0, "e": 50.0 * math.sqrt(2.0)}
-    found = sweep.evaluate("inverted_slider_crank", design, "psi, s, dpsi, ds, d2psi", phi="30 deg").iloc[0]
-    assert found["s"] == pytest.approx(37.1, abs=0.05)
-    assert 180.0 - math.degrees(found["psi"]) == pytest.approx(42.4, abs=0.05)
-    assert 10.0 * found["ds"] == pytest.approx(477.0, abs=0.5)
-    assert 10.0 * found["dpsi"] == pytest.approx(-4.08, abs=0.005)
-    assert 100.0 * found["d2psi"] == pytest.approx(233.0, abs=0.5)
+def test_geneva_drive_moves_as_its_triangle():
+    # Crank 50, pivots 50 sqrt(2) apart, crank at 30 deg: textbooks have 4.08, 233 and 477 at 10 rad/s.
+    a, e, phi = 50.0, 50.0 * math.sqrt(2.0), math.radians(30.0)
+    found = sweep.evaluate("inverted_slider_crank", {"a": a, "e": e}, "psi, s, dpsi, ds, d2psi", phi=phi).iloc[0]
+    square = a * a + e * e - 2.0 * a * e * math.cos(phi)  # of the slot, by the cosine rule; its derivatives follow
+    # Some ten roundings.
+    assert found["s"] ** 2 == pytest.approx(square, rel=1e-14)
+    assert math.tan(found["psi"]) == pytest.approx(a * math.sin(phi) / (a * math.cos(phi) - e), rel=1e-14)
+    assert found["ds"] == pytest.approx(a * e * math.sin(phi) / math.sqrt(square), rel=1e-14)
+    assert found["dpsi"] == pytest.approx(a * (a - e * math.cos(phi)) / square, rel=1e-14)
+    assert found["d2psi"] == pytest.approx(a * e * (e * e - a * a) * math.sin(phi) / square**2, rel=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("slots", "speed", "entry", "peak", "place"),
-    [
-        (4, 2.41, 1.0, 5.41, 11.46),
-        (5, 1.43, 0.7265, 2.30, 17.57),
-        (6, 1.0, 0.5774, 1.35, 22.90),
-        (8, 0.62, 0.4142, 0.70, 31.64),
-    ],
-)
-def test_geneva_wheel_has_the_tabulated_speed_and_accelerations(slots, speed, entry, peak, place):
-    # Tables of handbooks, quoted without a book at hand: largest speed, acceleration on entry, largest acceleration and
-    # its place, with a driver at 1 rad/s.
-    design = {"a": math.sin(math.pi / slots), "e": 1.0}
-    want = "max_abs_dpsi, max_abs_d2psi, phi_max_abs_d2psi"
-    found = sweep.summarise("inverted_slider_crank", design, want, accuracy=1e-10).iloc[0]
-    assert found["max_abs_dpsi"] == pytest.approx(speed, abs=0.005)
-    assert found["max_abs_d2psi"] == pytest.approx(peak, abs=0.005)
-    assert math.degrees(found["phi_max_abs_d2psi"]) == pytest.approx(place, abs=0.005)
-    entering = sweep.evaluate("inverted_slider_crank", design, "dpsi, d2psi", phi=math.pi / 2.0 - math.pi / slots)
+@pytest.mark.parametrize("slots", [3, 4, 5, 6, 8, 12])
+def test_geneva_wheel_has_the_speed_and_accelerations_of_its_closed_form(slots):
+    # With m = a/e = sin(pi/slots) and r^2 = 1 + m^2 - 2 m cos phi: psi'' = m (1 - m^2) sin phi/r^4, largest where its
+    # derivative is zero, which is a quadratic in cos phi.  The crank enters the slot along it.
+    m = math.sin(math.pi / slots)
+    want = "max_abs_dpsi, max_abs_d2psi, phi_max_abs_d2psi, max_abs_d3psi, swing, phi0"
+    found = sweep.summarise("inverted_slider_crank", {"a": m, "e": 1.0}, want, accuracy=1e-12).iloc[0]
+    half = (1.0 + m * m) / (4.0 * m)
+    cosine = math.sqrt(half * half + 2.0) - half
+    peak = m * (1.0 - m * m) * math.sqrt(1.0 - cosine**2) / (1.0 + m * m - 2.0 * m * cosine) ** 2
+    # The accuracy asked; a place comes from a root of the derivative.
+    assert found["max_abs_dpsi"] == pytest.approx(m / (1.0 - m), rel=1e-12)
+    assert found["max_abs_d2psi"] == pytest.approx(peak, rel=1e-12)
+    assert abs(math.cos(found["phi_max_abs_d2psi"])) == pytest.approx(cosine, rel=1e-11)
+    assert found["max_abs_d3psi"] == pytest.approx(m * (1.0 - m * m) / (1.0 - m) ** 4, rel=1e-12)
+    assert abs(found["swing"]) == pytest.approx(2.0 * math.pi / slots, rel=1e-14)
+    assert found["phi0"] == pytest.approx(math.pi - 2.0 * math.pi / slots, rel=1e-14)
+    place = math.pi / 2.0 - math.pi / slots
+    entering = sweep.evaluate("inverted_slider_crank", {"a": m, "e": 1.0}, "dpsi, d2psi", phi=place)
     assert entering["dpsi"][0] == pytest.approx(0.0, abs=1e-15)
-    assert entering["d2psi"][0] == pytest.approx(entry, abs=5e-5)
+    assert entering["d2psi"][0] == pytest.approx(math.tan(math.pi / slots), rel=1e-14)
 
 
 @pytest.mark.parametrize(

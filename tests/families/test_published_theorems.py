@@ -1,10 +1,12 @@
 """Theorems of the literature that hold exactly: Roberts' cognates, Bennett's linkage, Hooke's joints, the wobble drive,
-Watt's curve, Freudenstein's collineation axis.
+Watt's curve, Freudenstein's collineation axis; exercises of textbooks by the vector loops that they pose.
 
 The theorems are closed forms that share no equation with the kernels; tolerances are roundings of float64.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 import pytest
@@ -111,3 +113,63 @@ def test_collineation_axis_is_square_to_the_coupler_where_the_rocker_is_fastest(
     axis = pole - (crank - crank[1] / coupler[1] * coupler)
     # The place is flat to the root of the accuracy of the value; it comes from a root of the derivative.
     assert axis @ coupler / np.linalg.norm(axis) / np.linalg.norm(coupler) == pytest.approx(0.0, abs=1e-11)
+
+
+def test_slot_beside_its_pivot_moves_as_its_vector_loop() -> None:
+    # Crank 2 at 30 deg, frame 6, slot 4 beside the pivot of the rocker: row a of Norton's table of inverted linkages.
+    design = {"a": 2.0, "e": 6.0, "h": -4.0}
+    found = sweep.evaluate("inverted_slider_crank", design, "psi, s, dpsi, ds, d2psi, d2s", phi="30 deg").iloc[0]
+    pin, slot = 2.0 * np.exp(1j * np.pi / 6.0), np.exp(1j * found["psi"])
+    arm = found["s"] - 4.0j
+    speed = found["ds"] + 1j * arm * found["dpsi"]
+    growth = found["d2s"] + 1j * (arm * found["d2psi"] + found["ds"] * found["dpsi"]) + 1j * speed * found["dpsi"]
+    # pin = frame + arm in the slot's direction, and twice its derivative; some ten roundings of 6.
+    assert abs(pin - 6.0 - arm * slot) < 1e-14
+    assert abs(1j * pin - speed * slot) < 1e-14
+    assert abs(-pin - growth * slot) < 1e-14
+
+
+@pytest.mark.parametrize("branch", [-1, 1])
+def test_four_bar_moves_as_its_vector_loop(branch: int) -> None:
+    # Row a of Norton's tables of four-bars: frame 6, crank 2 at 30 deg, coupler 7, rocker 9.
+    design = {"a": 2.0, "b": 7.0, "c": 9.0, "e": 6.0, "branch": branch}
+    want = "omega_z, dpsi, eps_z, d2psi, psi, x_b, y_b, x_c, y_c"
+    found = sweep.evaluate("four_bar", design, want, phi="30 deg").iloc[0]
+    crank, rocker = 2.0 * np.exp(1j * np.pi / 6.0), 9.0 * np.exp(1j * found["psi"])
+    coupler = 6.0 + rocker - crank
+    # The coupler keeps its length and side; crank + coupler = frame + rocker, and twice its derivative.
+    assert abs(coupler) == pytest.approx(7.0, rel=1e-15)
+    assert math.copysign(1.0, (coupler * np.conj(1j * rocker)).real) == branch
+    assert abs(crank + 1j * (found["y_c"] - found["y_b"]) + found["x_c"] - found["x_b"] - 6.0 - rocker) < 5e-15
+    assert abs(crank + coupler * found["omega_z"] - rocker * found["dpsi"]) < 5e-15
+    turned = [1j * found[eps] - found[omega] ** 2 for eps, omega in (("eps_z", "omega_z"), ("d2psi", "dpsi"))]
+    assert abs(coupler * turned[0] - rocker * turned[1] - crank) < 2e-14
+
+
+def test_engine_moves_as_its_triangle() -> None:
+    # Crank 3 at 40 deg, rod 8, an engine of Beer and Johnston: sin(rod) = (a/b) sin(crank), and its derivatives.
+    want = "pressure_angle, s, ds, d2s, omega_z, eps_z"
+    rod = sweep.evaluate("slider_crank", {"a": 3.0, "b": 8.0}, want, phi="40 deg").iloc[0]
+    sine, cosine = math.sin(math.radians(40.0)), math.cos(math.radians(40.0))
+    lean = math.asin(3.0 / 8.0 * sine)
+    turn = -3.0 * cosine / (8.0 * math.cos(lean))
+    bend = (3.0 * sine / 8.0 - turn**2 * math.sin(lean)) / math.cos(lean)
+    expected = {
+        "pressure_angle": lean, "s": 3.0 * cosine + 8.0 * math.cos(lean), "omega_z": turn, "eps_z": bend,
+        "ds": -3.0 * sine + 8.0 * turn * math.sin(lean),
+        "d2s": -3.0 * cosine + 8.0 * (bend * math.sin(lean) - turn**2 * math.cos(lean)),
+    }  # fmt: skip
+    # Some ten roundings.
+    assert {name: rod[name] for name in expected} == pytest.approx(expected, rel=1e-14)
+
+
+def test_linkage_of_three_links_moves_as_its_vector_loop() -> None:
+    # Beer and Johnston: AB = 8 + 14 i, BD = 12 + 3 i, ED = -17 + 17 i.
+    drawn = sweep.from_points("four_bar", A=[0, 0, 0], B=[8, 14, 0], C=[20, 17, 0], D=[37, 0, 0])
+    design = drawn.parameters | {"branch": drawn.branch}
+    found = sweep.evaluate("four_bar", design, "omega_z, dpsi, eps_z, d2psi", phi=drawn.phi).iloc[0]
+    crank, coupler, rocker = 8.0 + 14.0j, 12.0 + 3.0j, -17.0 + 17.0j
+    # Some ten roundings of 25.
+    assert abs(crank + coupler * found["omega_z"] - rocker * found["dpsi"]) < 1e-13
+    turned = [1j * found[eps] - found[omega] ** 2 for eps, omega in (("eps_z", "omega_z"), ("d2psi", "dpsi"))]
+    assert abs(coupler * turned[0] - rocker * turned[1] - crank) < 1e-13

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -42,7 +44,13 @@ def test_guide_hoeken_linkage(branch, degrees, ground, speed, unevenness, deviat
     links = {"a": 1.0, "b": arm, "c": arm, "e": ground, "xi": 2.0 * arm, "branch": branch}
     phi = np.pi + np.radians(np.linspace(-0.5 * degrees, 0.5 * degrees, 2001))
     frame = sweep.evaluate("guide", links | LINE, ["s", "ds", "dev"], phi)
+    # The rocker pin is as far from crank pin, rocker pivot and point: the point is square to the line of both (Thales).
+    line = np.exp(1j * phi) - ground
+    point = ground + branch * 1j * line * np.sqrt((2.0 * arm / np.abs(line)) ** 2 - 1.0)
+    np.testing.assert_allclose(frame.s + 1j * frame.dev, point, rtol=1e-14)
     velocity = frame.ds.abs()
+    # In the middle of the range that line has its greatest length and only turns.
+    assert velocity[1000] == pytest.approx(math.sqrt(4.0 * arm**2 - (1.0 + ground) ** 2) / (1.0 + ground), rel=1e-14)
     assert velocity[1000] == pytest.approx(speed, abs=6e-6)
     assert np.ptp(frame.s) == pytest.approx(stroke, abs=6e-6)
     # the recomputed percentages carry three or four digits and come from a grid of their own

@@ -56,11 +56,15 @@ def test_swing_and_plotted_extrema_of_the_hardpoints():
     np.testing.assert_allclose(sorted([-acceleration.min(), acceleration.max()]), [12341.0, 12865.0], atol=1.0)
 
 
-def test_norton_four_bar_row_a():
-    # Ground 6, crank 2, coupler 7, rocker 9, crank at 30 degrees: open and crossed.
+def test_both_assemblies_of_a_four_bar_close_its_loop():
+    # Ground 6, crank 2, coupler 7, rocker 9, crank at 30 degrees, Norton's row a: the coupler has its length, and the
+    # two rockers are mirror images about the line from crank pin to rocker pivot.
     table = {"a": 2.0, "b": 7.0, "c": 9.0, "e": 6.0, "f": 0.0, "g": 0.0, "alpha": 0.0, "branch": [1.0, -1.0]}
-    psi = np.degrees(sweep.evaluate("rssr", table, ["psi"], phi=[math.radians(30.0)])["psi"])
-    np.testing.assert_allclose(sorted(psi), [-143.66, 117.29], atol=0.005)
+    psi = sweep.evaluate("rssr", table, ["psi"], phi=[math.radians(30.0)])["psi"]
+    line = 6.0 - 2.0 * np.exp(1j * math.radians(30.0))
+    np.testing.assert_allclose(np.abs(line + 9.0 * np.exp(1j * psi)), 7.0, rtol=1e-15)
+    assert math.cos(psi[0] + psi[1] - 2.0 * np.angle(line)) == pytest.approx(1.0, rel=1e-15)
+    np.testing.assert_allclose(np.degrees(psi), [-143.66, 117.29], atol=0.005)
 
 
 def test_transmission_angles_of_pylinkage():
