@@ -166,6 +166,14 @@ class Measure:
             return 0.5 / math.sqrt(abs(inner)) if inner else math.nan
         return 1.0
 
+    def relative_slope(self, inner: float) -> float:
+        """Return the relative change of the output per relative change of its inner value; 1 for pressure angles."""
+        if self.kind == "minus":
+            return self.parts[0].relative_slope(-inner)
+        if self.inner not in ("ratio", "square", "transmission") or not inner:
+            return 1.0
+        return inner * self.output_slope(inner) / self.from_inner(inner)
+
 
 def curve(family: Family, output: str, window: tuple[float, float] | None = None) -> Series:
     """Series of a pose output, limited to the window if one is given."""

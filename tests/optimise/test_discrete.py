@@ -15,7 +15,7 @@ from kernels import status as st
 from sweep.engine.run import run
 from sweep.errors import StudyError
 from sweep.families import family
-from sweep.optimise import Problem, minimise, on_locus, optimum
+from sweep.optimise import Problem, Result, minimise, on_locus, optimum
 from sweep.optimise.multistart.multistart import listed, with_neighbours
 from sweep.study import Limit, OptimiseSettings, load_study
 from tests.optimise.test_study import STUDY
@@ -133,6 +133,55 @@ def test_multipliers_of_limits_on_links_are_the_measured_changes() -> None:
     up, down = solved(bound * (1.0 + step))[0], solved(bound * (1.0 - step))[0]
     objective, words = solved(bound)
     assert words[f"{name} at its minimum"] == pytest.approx((up - down) / (2.0 * step * objective), rel=1e-3)
+
+
+SLIDER = Problem(
+    family("rssp"), ("a", "b", "e", "f", "alpha"), np.array([5.0, 20.0, -30.0, -20.0, 0.0]),
+    np.array([20.0, 80.0, 30.0, 20.0, np.pi / 3.0]), {"branch": 1.0}, "max_abs_d2s",
+)  # fmt: skip
+SLIDER_START = [19.0, 75.0, -28.0, -15.0, 0.9]
+ROCKER = Problem(
+    family("rssr"), ("a", "b", "c", "f", "g", "alpha"), np.array([4.0, 15.0, 8.0, -60.0, -30.0, 0.5]),
+    np.array([20.0, 90.0, 40.0, 40.0, 30.0, np.pi / 2.0]), {"e": 30.0, "branch": 1.0}, "max_abs_d2psi",
+)  # fmt: skip
+STROKE, RATIO = Limit("stroke", 24.4, None), Limit("stroke_ratio", 1.15, None)
+
+
+@pytest.mark.parametrize(
+    ("problem", "start", "limits"),
+    [
+        # Stroke ratio and transmission angle are searched as phi0 and as sin^2, a distance as its square.
+        (SLIDER, SLIDER_START, (STROKE, RATIO, Limit("least_transmission_angle", np.radians(50.0), None))),
+        (replace(SLIDER, objective="stroke_ratio"), SLIDER_START, (STROKE, Limit("max_abs_d2s", None, 13.0))),
+        (
+            ROCKER, [6.0, 46.0, 11.0, -30.0, 1.0, 1.5],
+            (Limit("swing", np.radians(50.0), None), Limit("pivot_distance", None, 45.0)),
+        ),
+    ],
+)  # fmt: skip
+def test_multipliers_are_the_measured_changes_of_what_is_searched_in_other_terms(
+    problem: Problem, start: list[float], limits: tuple[Limit, ...]
+) -> None:
+    def solved(changed: tuple[Limit, ...], design: list[float]) -> Result:
+        own = replace(problem, limits=changed)
+        found = minimise(own, own.rows([design]), OptimiseSettings())[0]
+        assert found.status == st.OK
+        return found
+
+    best, step = solved(limits, start), 1e-3
+    names = problem.family.parameter_names
+    place = [float(best.design[names.index(name)]) for name in problem.variables]
+    assert len(best.multipliers) >= len(limits)
+    for k, limit in enumerate(limits):
+        side = "minimum" if limit.maximum is None else "maximum"
+        value = getattr(limit, side)
+        ends = [
+            solved((*limits[:k], replace(limit, **{side: value * (1.0 + sign * step)}), *limits[k + 1 :]), place)
+            for sign in (1.0, -1.0)
+        ]
+        measured = (ends[0].objective - ends[1].objective) / (2.0 * step * best.objective)
+        # The objective bends over the step: a central difference is good to its square.
+        assert best.multipliers[f"{limit.output} at its {side}"] == pytest.approx(abs(measured), rel=1e-3)
 
 
 def test_smaller_of_the_two_relaxations_comes_first() -> None:

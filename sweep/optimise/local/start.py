@@ -68,8 +68,9 @@ def _result(number: int, problem: Problem, program: Program, descent: Descent, e
     elif exists:
         duals = descent.model.certificate(state)
         residual = duals.residual
-        size = abs(state.objective) or 1.0  # size of the objective here, in units of the start's
-        active = {text: weight / size for text, weight in in_words(state.form.labels, duals, problem.variables).items()}
+        # Size of the objective here, in units of the start's; its inner value may change at another rate than itself.
+        rate = program.objective.relative_slope(program.objective.to_inner(value)) / (abs(state.objective) or 1.0)
+        active = {text: weight * rate for text, weight in in_words(state.form.labels, duals, problem.variables).items()}
     values = {
         r.measure.name: program.value(r.measure, state.form, descent.model.curves, state.design, state.atoms)
         for r in program.requirements

@@ -130,8 +130,8 @@ def _bound_shift(quantity: Measure, bound: float | None, allowance: Allowance | 
 
 def _label(r: Requirement, side: str, bound: float, size: float) -> Label:
     """Return the label of a limit's row; violations of pressure angles and margins are not divided by the bound."""
-    unscaled = r.measure.inner == "pressure" or any(s.scale for s in r.measure.series)
-    return Label(r.measure.name, side, 1.0 if unscaled else abs(bound) / size)
+    angle_or_margin = r.measure.inner != "transmission" and any(s.scale for s in r.measure.series)
+    return Label(r.measure.name, side, 1.0 if angle_or_margin else abs(bound) / size / r.measure.relative_slope(bound))
 
 
 class _Layout:
