@@ -1,17 +1,20 @@
 """Theorems of the literature that hold exactly: Roberts' cognates, Bennett's linkage, Hooke's joints, the wobble drive,
-Watt's curve, Freudenstein's collineation axis; exercises of textbooks by the vector loops that they pose.
+Watt's curve, Freudenstein's collineation axis, Grashof's rule, spherical triangles, Cardan's circles, Hart's inversor,
+Scott Russell's line; exercises of textbooks by the vector loops that they pose.
 
 The theorems are closed forms that share no equation with the kernels; tolerances are roundings of float64.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
 import sweep
+from kernels import status as st
 
 ANGLES = np.radians([14.0, 75.0, 120.0, 163.0, 200.0, 255.0, 290.0, 340.0])
 
@@ -173,3 +176,89 @@ def test_linkage_of_three_links_moves_as_its_vector_loop() -> None:
     assert abs(crank + coupler * found["omega_z"] - rocker * found["dpsi"]) < 1e-13
     turned = [1j * found[eps] - found[omega] ** 2 for eps, omega in (("eps_z", "omega_z"), ("d2psi", "dpsi"))]
     assert abs(coupler * turned[0] - rocker * turned[1] - crank) < 1e-13
+
+
+def test_every_four_bar_of_whole_lengths_turns_by_the_rule_of_grashof() -> None:
+    """All 9^4 of lengths 1 to 9: the crank passes where frame and crank are in line, or the links touch there."""
+    a, b, c, e = np.array(list(itertools.product(range(1, 10), repeat=4)), float).T
+    found = sweep.summarise("four_bar", {"a": a, "b": b, "c": c, "e": e}, "rotatable, margin", accuracy=1e-10)
+    near, far = np.abs(e - a) - np.abs(b - c), b + c - (e + a)
+    turns = (near > 0.0) & (far > 0.0)
+    np.testing.assert_array_equal(found["rotatable"], turns)
+    touches = ~turns & (near >= 0.0) & (far >= 0.0)
+    assert (found["status"][touches] == st.UNDECIDABLE).all() and touches.sum() == 693 and turns.sum() == 1332
+    cosines = [(b * b + c * c - x * x) / (2.0 * b * c) for x in (e - a, e + a)]
+    margin = np.minimum(1.0 - cosines[0] ** 2, 1.0 - cosines[1] ** 2)
+    np.testing.assert_allclose(found["margin"][turns], margin[turns], rtol=0.0, atol=1e-14)  # some ten roundings of 1
+
+
+@pytest.mark.parametrize("phi", [-90.0, 0.0, 90.0, 180.0])
+@pytest.mark.parametrize("branch", [-1.0, 1.0])
+def test_spherical_four_bar_stands_by_the_cosine_rule(phi: float, branch: float) -> None:
+    """Crank, coupler, rocker and frame are arcs of one sphere; the crank is nearest to the rocker's axis at -90 deg."""
+    crank, coupler, rocker, frame = np.random.default_rng(5).uniform(0.1, np.pi - 0.1, (4, 500))
+    design = {"a": np.sin(crank), "f": np.cos(crank), "c": np.sin(rocker), "g": np.cos(rocker), "e": np.zeros(500)}
+    design |= {"b": 2.0 * np.sin(coupler / 2.0), "alpha": frame, "branch": np.full(500, branch)}
+    found = sweep.evaluate("rssr", design | {"phi": np.full(500, np.radians(phi))}, "psi, x_b, y_b")
+    angle = np.radians(phi + 90.0)
+    diagonal = np.arccos(np.cos(frame) * np.cos(crank) + np.sin(frame) * np.sin(crank) * np.cos(angle))
+    cosine = (np.cos(coupler) - np.cos(rocker) * np.cos(diagonal)) / (np.sin(rocker) * np.sin(diagonal))
+    reaches = np.abs(cosine) < 1.0
+    np.testing.assert_array_equal(found["status"] == st.OK, reaches)
+    assert reaches.sum() > 100
+    # From the diagonal to the rocker: the triangle's angle, on the side of the branch.  Some ten roundings.
+    turned = branch * (found["psi"] - np.arctan2(found["y_b"], found["x_b"]))[reaches]
+    np.testing.assert_allclose(np.cos(turned), cosine[reaches], rtol=0.0, atol=2e-14)
+    assert (np.sin(turned) > 0.0).all()
+
+
+def test_pin_of_the_circles_of_cardan_goes_straight_or_along_an_ellipse() -> None:
+    """A planet in a ring of twice its size; about the ellipse's centre the link turns as that of a Hooke's joint."""
+    drive = {"a": 3.0, "n": 2.0, "mesh": -1.0, "k": [1.0, 0.4]}
+    found = sweep.evaluate("epicyclic_dwell", drive, "x_b, y_b, psi, dpsi, d2psi", phi=ANGLES)
+    k = np.repeat(drive["k"], len(ANGLES))
+    np.testing.assert_allclose(found["x_b"], 3.0 + (1.0 + k) * np.cos(np.tile(ANGLES, 2)), rtol=1e-15, atol=1e-15)
+    np.testing.assert_allclose(found["y_b"], (1.0 - k) * np.sin(np.tile(ANGLES, 2)), rtol=1e-15, atol=1e-15)
+    assert (found.loc[found["design"] == 0, ["y_b", "psi", "dpsi", "d2psi"]] == 0.0).all(axis=None)
+    turn = sweep.summarise("epicyclic_dwell", drive | {"a": 0.0, "k": 0.4}, "max_dpsi, min_dpsi", accuracy=1e-12)
+    assert turn["max_dpsi"][0] == pytest.approx(1.4 / 0.6, rel=1e-12)
+    assert turn["min_dpsi"][0] == pytest.approx(0.6 / 1.4, rel=1e-12)
+
+
+def test_antiparallelogram_inverts_as_hart_says() -> None:
+    """Points that divide crank, frame and coupler alike: O, P, Q in line, OP times OQ = t (1 - t) (b^2 - a^2)."""
+    a, b, t = 2.0, 5.0, 0.3
+    crossed = np.sign(np.pi - ANGLES)
+    design = {"a": a, "b": b, "c": a, "e": b, "xi": t * b, "phi": ANGLES, "branch": crossed}
+    found = sweep.evaluate("four_bar", design, "x_b, y_b, x_m, y_m, psi, dpsi")
+    o = (1.0 - t) * (found["x_b"] + 1j * found["y_b"])
+    product = (found["x_m"] + 1j * found["y_m"] - o) * np.conj((1.0 - t) * b - o)
+    np.testing.assert_allclose(product, t * (1.0 - t) * (b * b - a * a), rtol=1e-14)
+    # The tangents of the half angles have one ratio.
+    half, ratio = np.tan(ANGLES / 2.0), (a + b) / (a - b)
+    np.testing.assert_allclose(np.tan(found["psi"] / 2.0) / half, ratio, rtol=1e-13)
+    np.testing.assert_allclose(found["dpsi"], ratio * (1.0 + half**2) / (1.0 + (ratio * half) ** 2), rtol=1e-13)
+
+
+def test_rod_of_an_isosceles_slider_crank_draws_the_line_of_scott_russell() -> None:
+    """Crank as long as the rod, in line: the rod's other end, as far behind the crank pin, goes square to the slide."""
+    phi = np.radians([-80.0, -50.0, 10.0, 75.0])
+    design = {"a": 2.0, "b": 2.0, "x_point": -2.0}
+    found = sweep.evaluate("slider_crank", design, "s, ds, d2s, x_p, y_p, dx_p, dy_p, d2x_p, d2y_p", phi=phi)
+    sine, cosine = 4.0 * np.sin(phi), 4.0 * np.cos(phi)
+    # The pressure angle is the crank angle: up to some forty roundings of 4 at 80 deg.
+    for name, expected in (("s", cosine), ("ds", -sine), ("d2s", -cosine), ("y_p", sine), ("dy_p", cosine)):
+        np.testing.assert_allclose(found[name], expected, rtol=0.0, atol=2e-14)
+    np.testing.assert_allclose(found["d2y_p"], -sine, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(found[["x_p", "dx_p", "d2x_p"]], 0.0, atol=1e-13)
+
+
+def test_five_positions_of_a_coupler_have_its_pins_as_circle_points_of_burmester() -> None:
+    """From five poses of the coupler alone, the pins keep their distances from the pivots."""
+    design = {"a": 1.4, "b": 4.2, "c": 3.1, "e": 3.9, "branch": -1.0, "xi": 1.9, "eta": 0.8}
+    found = sweep.evaluate("four_bar", design, "x_b, y_b, x_c, y_c, x_m, y_m", phi=ANGLES[:5])
+    b, c, m = (found[f"x_{pin}"] + 1j * found[f"y_{pin}"] for pin in "bcm")
+    turned = (c - b) / 4.2
+    for moving, pivot, radius in ((0.0, 0.0, 1.4), (4.2, 3.9, 3.1)):
+        np.testing.assert_allclose(np.abs(b + turned * moving - pivot), radius, rtol=1e-14)
+    np.testing.assert_allclose(m, b + turned * (1.9 + 0.8j), rtol=1e-14)

@@ -20,6 +20,12 @@ def test_guide_norton_position_problem():
     theta4 = np.degrees(np.arctan2(j.y_c, j.x_c - 6.0))
     np.testing.assert_allclose(theta3, [88.84, -115.21], atol=5e-3)
     np.testing.assert_allclose(theta4, [117.29, -143.66], atol=5e-3)
+    # Crank and coupler end where frame and rocker end; some roundings of 9.
+    ends = [
+        2.0 * np.exp(1j * np.radians(30.0)) + 7.0 * np.exp(1j * np.radians(theta3)),
+        6.0 + 9.0 * np.exp(1j * np.radians(theta4)),
+    ]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-14)
 
 
 def test_guide_transmission_angle_extremes():
