@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -175,7 +175,8 @@ def survey(
     counts = counted(groups)
     counted_results = [r for r in numbered if r.basin and counts[r.start]]
     hits = Counter(r.basin for r in counted_results)
-    best = _distinct(problem, starts, [r.start for r in counted_results if r.basin == 1], source)
+    in_best = sorted(r.start for r in counted_results if r.basin == 1)
+    best = len(distinct(problem, starts, np.column_stack([starts[:, problem.others], source]), in_best, DISTINCT))
     populations = hits.total() if settings.by_populations else 0
     return Survey(
         len(finished), most_counted(settings), len(hits), best, _unseen(hits), wanted(settings), ended,
@@ -224,21 +225,21 @@ def _unseen(hits: Counter[int]) -> float:
     return min(1.0, max(singletons / n, w * (w + 1) / (n * (n - 1)))) if n > 1 else 1.0
 
 
-def _distinct(problem: Problem, starts: Array, numbers: list[int], source: Sequence[int]) -> int:
-    """Return the number of starts that are far apart or come from different sources."""
-    fractions = problem.scaled(starts)
-    distance = DISTINCT * math.sqrt(fractions.shape[1] / 6.0)
-    taken: list[int] = []
-    for k in sorted(numbers):
-        near = (
-            np.linalg.norm(fractions[k] - fractions[j]) < distance
-            and source[k] == source[j]
-            and np.array_equal(starts[k, problem.others], starts[j, problem.others])
-            for j in taken
-        )
-        if not any(near):
+def distinct(
+    problem: Problem, designs: Array, kinds: Array, rows: Iterable[int], share: float, first: Iterable[int] = ()
+) -> list[int]:
+    """Return the ``first`` rows of designs (k, P), and those of ``rows`` that are not near an earlier one.
+
+    Two designs are near each other if their ``kinds`` (k, n) are equal and their distance is below a ``share`` of the
+    average distance of two random designs.
+    """
+    x, taken = problem.scaled(designs), list(first)
+    distance = share * math.sqrt(x.shape[1] / 6.0)
+    for k in rows:
+        far = np.linalg.norm(x[taken] - x[k], axis=1) >= distance
+        if (far | (kinds[taken] != kinds[k]).any(axis=1)).all():
             taken.append(k)
-    return len(taken)
+    return taken
 
 
 def _kinds(problem: Problem, starts: Array, results: Sequence[Result]) -> tuple[tuple[str, int, int], ...]:

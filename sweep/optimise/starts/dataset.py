@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -14,7 +13,7 @@ from kernels import status as st
 from sweep.chunks.parameters import runs_matrix
 from sweep.dataset.chunk_files import batches, parts
 from sweep.families.base import Array, Family
-from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup, in_groups
+from sweep.optimise.multistart.survey import GROUP_SIZE, StartGroup, distinct, in_groups
 from sweep.optimise.problem.statement import Problem
 from sweep.optimise.starts.populations import diverse
 from sweep.optimise.starts.ranked import ALIKE, RANKED, ranking, samples
@@ -204,14 +203,7 @@ def sample_seconds(problem: Problem, base: Array, count: int) -> float:
 
 def with_distinct(problem: Problem, starts: Array, more: Array, count: int) -> Array:
     """Return the starts and those of ``more`` designs that are not near any of them, at most ``count`` in all."""
-    designs = np.concatenate([starts, more])
-    x = problem.scaled(designs)
-    others = problem.others
-    distance = ALIKE * math.sqrt(x.shape[1] / 6.0)
-    taken = list(range(len(starts)))
-    for k in range(len(starts), len(designs)):
-        far = np.linalg.norm(x[taken] - x[k], axis=1) >= distance
-        other_signs = (designs[taken][:, others] != designs[k, others]).any(axis=1)
-        if len(taken) < count and bool((far | other_signs).all()):
-            taken.append(k)
-    return np.asarray(designs[taken], np.float64)
+    designs, present = np.concatenate([starts, more]), len(starts)
+    signs = designs[:, problem.others]
+    rows = distinct(problem, designs, signs, range(present, len(designs)), ALIKE, range(present))
+    return np.asarray(designs[rows[:count]], np.float64)
