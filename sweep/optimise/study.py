@@ -89,7 +89,7 @@ def write(
             wanted = output(family, plain)
             text = f"{error_words(study, plain)} of {wanted.text}" if is_error(name) else wanted.text
             texts[name] = (wanted.unit.replace("length", "mm"), text)
-    arrays = {name: pa.array(_for_arrow(values)) for name, values in columns.items()}
+    arrays = {name: pa.array(np.asarray(values)) for name, values in columns.items()}
     fields = [
         pa.field(name, array.type, metadata={"unit": texts[name][0], "definition": texts[name][1]})
         for name, array in arrays.items()
@@ -100,11 +100,6 @@ def write(
     table = pa.Table.from_arrays(list(arrays.values()), schema=schema)
     pq.write_table(table, sink, compression="zstd", write_page_checksum=True)
     files.write_atomically(path, bytes(sink.getvalue()))
-
-
-def _for_arrow(values: Any) -> Any:
-    array = np.asarray(values)
-    return array.tolist() if array.dtype.kind == "U" else array
 
 
 POSES = 720
@@ -302,10 +297,9 @@ def _curves(study: Study, table: dict[str, Any]) -> dict[str, Any]:
     family = study.family
     shown = study.output.curves != "none" and not isinstance(family.domain, Interval)  # an interval has no turn
     selected = [k for k, role in enumerate(table["role"]) if shown and role in ("optimum", "reference")]
-    designs = np.array([[table[name][k] for name in family.parameter_names] for k in selected])
+    designs = np.column_stack([table[name] for name in family.parameter_names])[selected]
     wanted = [*motion_curves(family), *joint_curves(family)]
     phi: Array = np.arange(POSES, dtype=np.float64) * (2.0 * np.pi / POSES)
-    designs = designs.reshape(len(selected), len(family.parameters))
     columns = family.poses(designs, Angles.of(phi[None, :]), frozenset(wanted))
     heads = {"role": np.repeat([table["role"][k] for k in selected], POSES), "phi": np.tile(phi, len(selected))}
     return heads | {name: columns[name].ravel() for name in [*wanted, "status"]}
