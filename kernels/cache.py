@@ -32,6 +32,7 @@ class _Locator:
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         self._folder = CACHE_DIR / resolved(file).relative_to(SOURCES).with_suffix("")
+        self._py_file = file  # which numba names in its warning that a function cannot be kept
         self._line = function.__code__.co_firstlineno
 
     @classmethod

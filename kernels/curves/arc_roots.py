@@ -4,7 +4,8 @@ An arc is traversed as psi = centre - half cos(tau), so that a square root at it
 the whole circle, where tau is psi itself.  Roots are bracketed between samples, and where the function dips between
 samples of equal sign the dip is searched.  Real numbers only; the caller polishes what is found.
 
-The function is a helper ``value(k, psi)``; ``k`` holds its parameters.
+The function is a helper ``value(k, psi)``; ``k`` holds its parameters.  What it is handed to is folded in, as numba
+keeps no machine code of a kernel that hands a function on to another one.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Callable
 from typing import Any
 
 from kernels.curves.root_search import bisected, least_value
-from kernels.jit import inline, part
+from kernels.jit import inline
 from kernels.types import Array
 
 MOST = 8  # roots that are kept; the callers' functions have at most four, and rounding may split a double root
@@ -50,7 +51,7 @@ def _root(
     return angle_at(centre, half, bisected(_is_positive, low, high, sign, value, k, centre, half)[0])
 
 
-@part
+@inline
 def dip(
     value: Callable[..., float], k: Any, centre: float, half: float, low: float, high: float, sign: float
 ) -> tuple[float, float]:
@@ -58,7 +59,7 @@ def dip(
     return least_value(_signed, low, high, sign, value, k, centre, half)
 
 
-@part
+@inline
 def scan(
     value: Callable[..., float], cells: int, k: Any, centre: float, half: float, noise: float, count: int, at: Array
 ) -> tuple[int, float, float]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.support.kernel_tree import HELPER, KERNEL, REPORT, edit, process, report
+from tests.support.kernel_tree import HELPER, KERNEL, REPORT, SOURCES, edit, process, report
 from tests.support.selection import mostly_long
 
 
@@ -206,3 +207,42 @@ def test_generated_kernels_are_kept_under_their_names_with_what_they_close_over(
     )
     assert report(tree, program) == ["2.0", "3.0", "0", "0"]
     assert report(tree, program) == ["2.0", "3.0", "1", "1"]
+
+
+LARGE = """
+import numpy as np
+from kernels.jit import kernel
+
+TABLE = np.ones(2_000_000)  # numba does not write an array of more than a million bytes into the machine code
+
+
+@kernel
+def run(x):
+    return x + TABLE[1]
+"""
+
+
+def test_a_kernel_whose_code_cannot_be_kept_is_named(tree: Path) -> None:
+    """The locator had no name of the source for numba's warning; the error of that was taken for a damaged file."""
+    (tree / "loop.py").write_text(LARGE)
+    with process(tree, REPORT, subprocess.PIPE) as running:
+        found, said = running.communicate(timeout=60)
+    assert found.split() == ["2.0", "0", "KernelCache"]
+    assert "loop.py" in said and 'Cannot cache compiled function "run"' in said
+
+
+def test_what_is_handed_a_function_is_folded_in() -> None:
+    """numba keeps no code of a kernel that hands a function on to another one; whether LLVM folds a part is its affair.
+
+    The warning of the test before is an error in every other test, so one that is handed a function otherwise is found.
+    """
+    handed, folded = set[str](), set[str]()
+    for path in SOURCES.rglob("*.py"):
+        for function in ast.walk(ast.parse(path.read_text())):
+            if isinstance(function, ast.FunctionDef) and function.decorator_list:
+                takes = [*function.args.args, *([function.args.vararg] if function.args.vararg else ())]
+                if any(one.annotation and "Callable" in ast.unparse(one.annotation) for one in takes):
+                    by = {ast.unparse(one) for one in function.decorator_list}
+                    of = folded if by & {"inline", "folded"} else handed if by & {"part", "kernel"} else set[str]()
+                    of.add(f"{path.name}: {function.name}")
+    assert len(folded) > 10 and not handed
