@@ -111,6 +111,7 @@ class Reduced(NamedTuple):
     across_z: float
     across_x: float
     radius: float  # cam radius at the least displacement
+    lowest: float  # thread law where the displacement is least
     least: float  # least displacement over the turn
     unit: float
     valid: bool
@@ -163,13 +164,14 @@ def reduce_design(designs: Array, i: int) -> Reduced:
     # a store this small against the rest would have squares below float64 after scaling
     valid = valid and designs[i, 0].real > 1e-140 * size
     unit, per_unit = unit_near(size if valid else 1.0)
-    _, lowest = _largest(designs, i, None, LOOKS)
-    thread = (designs[i, 0] + law(designs, i, math.cos(lowest), math.sin(lowest))[0]) * per_unit
+    _, where = _largest(designs, i, None, LOOKS)
+    lowest = law(designs, i, math.cos(where), math.sin(where))[0] * per_unit
+    thread = designs[i, 0] * per_unit + lowest
     across_z, across_x = designs[i, 2] * per_unit, (designs[i, 3] - designs[i, 1]) * per_unit
     square = displacement(thread, across_z, across_x)
     least = np.sqrt(square) if reaches(square.real, thread.real) == st.OK else math.nan * square
     return Reduced(
-        designs[i, 0] * per_unit, across_z, across_x, designs[i, 4] * per_unit, least, unit, valid
+        designs[i, 0] * per_unit, across_z, across_x, designs[i, 4] * per_unit, lowest, least, unit, valid
     )  # fmt: skip
 
 
@@ -221,7 +223,9 @@ def poses(designs: Array, cos_phi: Array, sin_phi: Array, status: Status, out: O
             write(out.dS, i, j, ds * r.unit)
             write(out.d2S, i, j, d2s * r.unit)
             if whole:
-                reach = r.radius + (s - r.least)
+                # S less its least value by the difference of P: near it two large displacements would cancel.
+                rise = (value - r.lowest) * (thread + (r.store + r.lowest)) / (4.0 * (s + r.least))
+                reach = r.radius + rise
                 write(out.pressure_angle, i, j, arctan2(magnitude(ds), reach))
                 # The cam turns by phi against the follower: its profile is passed backwards.
                 put_block(out.profile, i, j, (reach * u, -reach * v), r.unit)

@@ -1,9 +1,9 @@
-"""Eyelets whose guides are near the crank axis, against numerical derivatives in 60 digits."""
+"""Eyelets whose guides are near the crank axis, and a cam without a radius, against 60 and 40 digits."""
 
 from __future__ import annotations
 
 import numpy as np
-from mpmath import mp
+from mpmath import mp, mpf
 
 import sweep
 from sweep.families import family
@@ -28,3 +28,26 @@ def test_eyelet_keeps_its_digits_where_the_guides_are_near_the_crank_axis():
         for name, expected in (("dP", length[1]), ("d2P", 2 * length[2])):
             large = max(large, cond[name], float(abs(expected)))
             assert float(abs(got[name] - expected)) <= 16.0 * 2.0**-53 * large, (design, phi, name)
+
+
+def test_cam_without_a_radius_keeps_its_digits_near_the_least_displacement():
+    # Its radius is S less its least value.  P is rounded some 8 times and makes T/(4 S) of that; S itself, two hundred
+    # times as large as P, was rounded before: some 100 units.
+    design = {"P_h": 60.0, "X1": 3.0, "Z1": 12.0, "e": 5.0, "R0": 0.0, "A1": 0.125, "B2": 0.03125}
+    with mp.workdps(40):
+
+        def law(x):
+            return mpf(0.125) * mp.cos(x) + mpf(0.03125) * mp.sin(2 * x)
+
+        def displacement(x):
+            return mp.sqrt((60 + law(x)) ** 2 / 4 - 144 - 4)
+
+        least = mp.findroot(lambda x: -0.125 * mp.sin(x) + 0.0625 * mp.cos(2 * x), 3.0)
+        assert law(least) < min(law(mpf(k) / 10) for k in range(63))
+        for step in (1e-3, -1e-2, 0.1, -0.5):
+            phi = float(least) + step
+            got = sweep.evaluate("guided_cam", design, ["pressure_angle"], phi=[phi])["pressure_angle"][0]
+            slope, radius = abs(mp.diff(displacement, mpf(phi))), displacement(mpf(phi)) - displacement(least)
+            rounded = 8.0 * 2.0**-53 * 0.15625 * float((60 + law(least)) / (4 * displacement(least)))
+            off = float(abs(got - mp.atan2(slope, radius)))
+            assert off <= rounded * float(slope / (slope**2 + radius**2)) + 4.0 * 2.0**-53, step
