@@ -22,6 +22,7 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 FLAT = 1e-9
+LEVEL_SLOPE = 1e-3  # change in a step, relative to the bend, from which on a sample at the level is no touch
 RANK = np.ones(256, np.int64)  # of a status: the higher one counts for the whole turn
 RANK[[st.OK, st.DEAD_POINT, st.SINGULAR, st.NOT_ASSEMBLED, st.INVALID_INPUT]] = 0, 2, 3, 4, 5
 
@@ -219,9 +220,10 @@ def grazes(values: Array, level: Array, doubtful: Mask) -> None:
 
     Parameters
     ----------
-    values : (n, m) samples over one turn
+    values : (n, m) samples over one turn; m >= 5
     level : (n,)
-    doubtful : (n,) in and out; set where the parabola through a turning point passes the level and its sample does not
+    doubtful : (n,) in and out; set where the parabola through a turning point passes the level and its sample does not.
+        A sample at the level itself is a touch unless the curve has a slope there.
     """
     m = values.shape[1]
     for i in range(values.shape[0]):
@@ -233,7 +235,11 @@ def grazes(values: Array, level: Array, doubtful: Mask) -> None:
                 slope = 0.5 * (right - left)
                 # Twice the parabola's overshoot, as it is only an estimate.
                 beyond = here - slope * (slope / bend)
-                if (here >= level[i]) != (beyond >= level[i]):
+                if here == level[i]:
+                    # A touch may be skew: five samples tell its slope from that.
+                    further = values[i, (j + 2) % m] - values[i, j - 2]
+                    doubtful[i] |= abs(8.0 * (right - left) - further) > 12.0 * LEVEL_SLOPE * abs(bend)
+                elif (here >= level[i]) != (beyond >= level[i]):
                     doubtful[i] = True
 
 

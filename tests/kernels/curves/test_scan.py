@@ -117,6 +117,22 @@ def test_grazes_sees_a_crest_between_samples(function):
         assert doubtful[0] == expected
 
 
+@pytest.mark.parametrize("function", [scan.grazes, scan.grazes.py_func], ids=["compiled", "plain"])
+def test_grazes_tells_a_touch_at_a_sample_from_two_passages_beside_it(function):
+    """The skew of a touch raised the parabola above the level; beside a sample on it no passage was looked for."""
+    phi = np.arange(256) * (2.0 * np.pi / 256)
+    x = phi - phi[100]
+    for sign in (1.0, -1.0):
+        touch = sign * (np.cos(x) - 1.0) * (1.0 + 0.5 * np.sin(x))
+        # The second passage is a tenth of the spacing after the sample: a slope of 1/20 of the bend.
+        twice = sign * (np.cos(x - np.pi / 2560.0) - np.cos(np.pi / 2560.0))
+        twice[100] = 0.0
+        for curve, expected in ((touch, False), (twice, True)):
+            doubtful = np.zeros(1, np.bool_)
+            function(curve[None, :], np.zeros(1), doubtful)
+            assert doubtful[0] == expected
+
+
 @pytest.mark.parametrize("function", [scan.worst_status, scan.worst_status.py_func], ids=["compiled", "plain"])
 def test_worst_status_prefers_the_first_cause(function):
     rows = [
