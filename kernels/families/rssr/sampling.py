@@ -291,31 +291,17 @@ def mark_peaks(count: int, size: Array, share: float) -> None:
 
 
 @inline
-def _append_lowest(
-    marks: int, at: Array, k: int, table: CosSin, size: Array, of: Samples, m: Array, count: int
-) -> None:
-    """Append the maximum of the lowest bit of ``marks`` (:func:`list_marked`); a meaningless one if no bit is set."""
-    i = lowest_bit(marks) & 63
-    angle = (of.n - FEWEST + of.begin + i) & _NEVER_NEGATIVE
-    before = (of.first + i * of.stride) & _NEVER_NEGATIVE
-    three = size[before], size[before + of.stride], size[before + 2 * of.stride]
-    append(at, k, table[0][angle], table[1][angle], three, of.n, of.begin + i, m, count & _NEVER_NEGATIVE)
-
-
-@inline
 def list_marked(marks: int, at: Array, k: int, table: CosSin, size: Array, of: Samples, m: Array, count: int) -> int:
     """Append the local maxima of design k that are bits of ``marks`` to the list; returns its new length.
 
     Bit i stands for sample ``begin`` + i.
     """
-    # Nearly all designs have one such maximum or two.  Two are written in any case, without a branch that the
-    # processor could mispredict; the next design overwrites the surplus.
-    for _ in range(2):
-        _append_lowest(marks, at, k, table, size, of, m, count)
-        count += 1 if marks != 0 else 0
-        marks &= marks - 1
     while marks != 0:
-        _append_lowest(marks, at, k, table, size, of, m, count)
+        i = lowest_bit(marks) & 63
+        angle = (of.n - FEWEST + of.begin + i) & _NEVER_NEGATIVE
+        before = (of.first + i * of.stride) & _NEVER_NEGATIVE
+        three = size[before], size[before + of.stride], size[before + 2 * of.stride]
+        append(at, k, table[0][angle], table[1][angle], three, of.n, of.begin + i, m, count & _NEVER_NEGATIVE)
         count += 1
         marks &= marks - 1
     return count
