@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from kernels.effects.speed_fluctuation import Uneven, speed_fluctuation
-from kernels.status import NOT_CONVERGED, OK
+from kernels.status import JAMMED, NOT_CONVERGED, OK
 from kernels.types import Array, Status
 from sweep.numerics.curves import FINEST, PER_GAP
 from sweep.numerics.records import Indices
@@ -83,13 +83,16 @@ def steady(
 
     Design outputs are computed for the magnitude of the speed; errors of the energy, and of the torque without jumps,
     are shares of J speed^2.  A crank that turns backwards is one that turns forwards in -phi, where the excess torque
-    acts with the opposite sign.
+    acts with the opposite sign.  NOT_CONVERGED where the motor line is too steep for the steps of the integration, or
+    the search that starts from constant torque does not find the speed.
     """
     n, sense = len(inertia), np.copysign(1.0, speed)[:, None]
     phi, (stored, left) = forwards(speed, phi, inertia, sense * excess)
     out = Uneven(*(np.empty(n) for _ in range(5)), *(np.empty((n, phi.shape[1])) for _ in range(2)))
     status = np.empty(n, np.uint8)
     speed_fluctuation(stored, left, np.abs(speed), phi, status, out, coarsest, slope)
+    if slope is not None:  # a motor line holds every load at some speed: the crank has one that was not found
+        status[(status == JAMMED) & (slope > 0.0)] = NOT_CONVERGED
     found = {"unevenness": out.delta, "fastest": out.fastest, "slowest": out.slowest, "missed": out.missed}
     with np.errstate(divide="ignore", invalid="ignore"):
         torque = (beyond(excess) / speed**2 + 0.5 * beyond(inertia, order=1)) / inertia.mean(axis=1)

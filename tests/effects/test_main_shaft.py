@@ -76,6 +76,16 @@ def test_speed_over_the_turn_keeps_energy_and_mean():
     )
 
 
+def test_motor_line_that_is_too_steep_to_integrate_does_not_stop_the_shaft():
+    """Its status said that the crank stops; at even speed less than 1e-3 of the speed gives the whole torque."""
+    inertia = sweep.evaluate(machine(), table(), ["shaft_inertia"], phi=PHI)["shaft_inertia"].mean()
+    steep = table(shaft_motor_slope=3000.0 * inertia * OMEGA)
+    found = sweep.summarise(machine(), steep, ["shaft_unevenness"], accuracy=1e-8).iloc[0]
+    assert found.status == st.NOT_CONVERGED and np.isnan(found.shaft_unevenness)
+    torque = sweep.evaluate(machine(), steep, ["shaft"], phi=PHI)["shaft"]
+    assert np.ptp(torque) < 1e-3 * steep["shaft_motor_slope"] * OMEGA
+
+
 def test_a_machine_of_one_member_is_that_member():
     alone = sweep.machine({"needle": ["rssr", "guide"]}, {"shaft": {"torque": ["needle"]}})
     own = {key: x for key, x in table().items() if not key.startswith("looper")} | {"shaft_motor_slope": 0.3}
