@@ -62,7 +62,8 @@ def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     """Compute the least radius and related maxima of smooth functions, to rounding at any accuracy.
 
     The error bounds exceed the errors measured against 10^5 samples: 64 roundings of the lengths for a maximum, and
-    their square root for its place.
+    their square root for its place.  Where the thread is hardly longer than the way between the guides, roundings of
+    its length L change S by L/(4 S) times as much.
     """
     n = len(designs)
     status, columns = np.empty(n, np.uint8), {o.name: np.empty(n) for o in DESIGN_OUTPUTS}
@@ -70,8 +71,17 @@ def size(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
     found: Columns = {name: columns[name] for name in columns if name in wanted}
     if accuracy.target is not None:
         length = 64.0 * EPS * (np.abs(columns["least_radius"]) + designs[:, 0])
-        errors = {"phi_least_radius": np.full(n, 1e-7), "jam_angle": np.full(n, 4.0 * EPS)}
-        found |= {f"err_{name}": errors.get(name, length) for name in list(found)}
+        least, place = columns["least_displacement"], columns["phi_least_radius"]
+        there = np.asarray(poses(designs, Angles.of(place[:, None]), frozenset("S"))["S"], np.float64)[:, 0]
+        with np.errstate(all="ignore"):
+            amplified = EPS * (designs[:, 0] + np.abs(designs[:, guided_cam.FIRST :]).sum(axis=1)) ** 2
+            slope = columns["least_radius"] - least + there  # |S'|/tan [theta], whose share of error is that of S
+            radius = length + amplified * (1.0 / least + 1.0 / there + np.abs(slope) / there**2)
+            errors = {
+                "least_radius": radius, "phi_least_radius": np.full(n, 1e-7), "jam_angle": np.full(n, 4.0 * EPS),
+                "least_displacement": length + amplified / least,
+            }  # fmt: skip
+        found |= {f"err_{name}": errors[name] for name in list(found)}
     return found | {"status": status}
 
 
