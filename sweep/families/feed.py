@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from kernels.families import feed
-from kernels.status import NOT_ASSEMBLED, NOT_CONVERGED
+from kernels.status import NO_EVENT, NOT_ASSEMBLED, NOT_CONVERGED, OK
 from kernels.types import EPS, Array
 from sweep.families.base import (
     Accuracy,
@@ -135,10 +135,13 @@ def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Column
         errors = {
             "phi_entry": angle, "phi_leave": angle, "feed_angle": angle, "entry_speed": height + angle * size,
             "leave_speed": height + angle * size, "stitch_length": height + angle * size, "rise": height,
-            "flatness": height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"])
-            + area_error,
+            "flatness": np.fmax(np.abs(columns["flatness"]), 1.0)
+            * (height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"])) + area_error,
             "crossings": np.zeros(len(designs)),
         }  # fmt: skip
+    if "flatness" in wanted:  # a path that the tooth retraces encloses no area
+        retraced = (status == OK) & (columns["stitch_length"] == 0.0)
+        status[retraced], columns["flatness"][retraced] = NO_EVENT, np.nan
     return chosen(columns | {f"err_{name}": error for name, error in errors.items()}, wanted, status)
 
 

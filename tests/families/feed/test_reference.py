@@ -7,6 +7,7 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as some
@@ -163,6 +164,32 @@ def test_flatness_of_a_path_with_a_sharp_bend_is_within_its_error():
     path = sweep.evaluate("feed", p, ["y_t", "dx_t"], phi=phi)
     area = half * np.tile(weights, 1024) @ ((path.y_t - p["y_plate"]) * path.dx_t)
     assert abs(got.flatness - area / (got.rise * got.stitch_length)) <= got.err_flatness <= 1e-9
+
+
+@pytest.mark.parametrize("y_plate", [0.07953929571289062, 0.07954400037170409])
+def test_error_of_flatness_grows_with_it_as_the_stitch_vanishes(y_plate):
+    """A plate at which the tooth leaves where it entered: err_ was relative, 1e4 times too small at a flatness of 1e6.
+
+    The reference is exact to 1e-20 of the path; of the flatness less than 1e-10 is lost to a stitch of 1e-7.
+    """
+    nearly = RACK | {"tx": 1.0, "ty": -0.5, "dE": 2.0, "y_plate": y_plate}
+    found = sweep.summarise("feed", nearly, ["flatness", "phi_entry", "phi_leave"], accuracy=1e-8).iloc[0]
+    slow = naive.feeding(exact(nearly), found.phi_entry, found.phi_leave)
+    assert found.status == st.OK and abs(found.flatness) > 1e3
+    assert abs(found.flatness - float(slow["flatness"])) <= found.err_flatness <= 1e-2 * abs(found.flatness)
+
+
+def test_flatness_of_a_tooth_that_comes_back_the_way_it_went_is_none():
+    """Without eccentricity the rocker moves the rack to and fro: the status of this mechanism was INVALID_INPUT."""
+    swung = {"h_a": 0.1, "h_b": 1.0, "h_c": 1.0, "h_e": 1.0, "rh": 1.0, "dh": 0.5 * math.pi, "xE": 0.0, "yE": 0.0,
+             "rE": 0.0, "dE": 0.0, "q": 2.0, "fx": -1.0, "fy": 0.0, "tx": 0.0, "ty": 0.2}  # fmt: skip
+    ends = sweep.summarise("feed", swung, ["max_y_t", "min_y_t"], accuracy=1e-8).iloc[0]
+    low, high = ends.min_y_t, ends.max_y_t
+    plates = pd.DataFrame([swung | {"y_plate": low + share * (high - low)} for share in (0.25, 0.4, 0.5, 0.6, 0.75)])
+    found = sweep.summarise("feed", plates, ["flatness", "stitch_length"], accuracy=1e-8)
+    retraced = found[found.stitch_length == 0.0]  # others are off by a rounding, and so says the error
+    assert len(retraced) > 0 and (retraced.status == st.NO_EVENT).all() and retraced.flatness.isna().all()
+    assert (sweep.summarise("feed", plates, ["stitch_length", "rise"], accuracy=1e-8).status == st.OK).all()
 
 
 def test_feed_speed_at_entry_and_way_between_agree_with_poses():
