@@ -1,4 +1,13 @@
-"""linksweep: parameter sweeps and optimum design of the linkages of textile and sewing machines."""
+"""linksweep: parameter sweeps and optimum design of the linkages of textile and sewing machines.
+
+- ``evaluate`` computes poses of designs, ``summarise`` numbers of a whole turn, ``mechanism`` binds one design.
+- ``run`` computes a study file into a folder; ``load``, ``scan``, ``verify``, ``compare`` read such folders.
+- ``synthesise`` and ``from_points`` find dimensions; ``plot``, ``joints``, ``export`` show a design.
+- ``machine`` puts several mechanisms on one shaft; ``cyclogram``, ``thread``, ``rod`` belong to machines and loads.
+
+Numbers are in one unit of length (mm) and rad; texts such as ``"40 mm"`` carry their unit.  `sweep families` and
+`sweep effects` on the command line list the names; docs/tutorial.md is the way in.
+"""
 
 from __future__ import annotations
 

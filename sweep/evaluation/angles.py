@@ -24,7 +24,7 @@ AngleUnit: TypeAlias = Literal["rad", "deg"]
 RADIANS = math.pi / 180.0  # of a degree
 REMEDY = (
     'for degrees say angles="deg" (--angles deg), or "{name} [deg]" as the column\'s name, or a text such as "90 deg"; '
-    'for rad "rad" in the same way'
+    'if they are in rad, say angles="rad" (--angles rad)'
 )
 
 # Most angles lie between two directions and are at most one turn, with slack for rounding.  Crank angles, the offset of

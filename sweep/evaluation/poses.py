@@ -197,7 +197,7 @@ def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:
             guess = nearest(name, [*mechanism.pose_names, *(o.name for o in offered(mechanism))])
             guess = elsewhere(mechanism, name) or guess
             if name in output_names(mechanism):
-                guess = f"; {name} is one of a whole turn, ask `summarise`"
+                guess = f"; {name} is an output of a whole turn: ask `summarise`"
             if name in (*mechanism.parameter_names, mechanism.domain.name):
                 guess = f"; {name} is a column of the table, keep= repeats it in the result"
             raise InputError("want", name, f"{allowed}{guess}", f"pose outputs of {mechanism.name}")

@@ -307,11 +307,11 @@ def _known(family: Family, name: str) -> str:
         near = f"; {name} is the effect {min(effects, key=len)} here"
     if name in family.pose_names:
         extremes = ", ".join(f"{prefix}{name}" for prefix in grammar if not prefix.startswith(f"{family.domain.name}_"))
-        near = f"; {name} is one of a single pose, ask `evaluate`, or for one of {extremes}"
+        near = f"; {name} is an output of a single pose: ask `evaluate`, or for one of {extremes}"
     if name in family.parameter_names:
         near = f"; {name} is a parameter: a dataset has it, and keep= repeats it in a result"
     if name in BOXES and isinstance(family, Chain):
-        near = f"; {name} is one of a stage, as {name}1; of a machine there is one of all its members"
+        near = f"; {name} exists for a stage, as {name}1, and for a machine"
     if of_effects:
         words += ", and those of effects (sweep effects)"
     return words + (elsewhere(family, name) or _of_families(name) + near)
@@ -323,4 +323,4 @@ def _of_families(name: str) -> str:
         other for other in map(find_family, NAMES) if any(o.name == name for step in other.steps for o in step.provides)
         or any(name in limit_names(other, position, stage) for position, stage in other.positions.items())
     ]  # fmt: skip
-    return f"; {name} is one of {listed(other.name for other in others)}" if others else ""
+    return f"; {name} is an output of {listed(other.name for other in others)}" if others else ""

@@ -112,8 +112,8 @@ def test_an_output_by_the_number_of_its_link(word: str, name: str) -> None:
 
 
 def test_an_output_asked_of_the_wrong_function() -> None:
-    refused("swing is one of a whole turn, ask `summarise`", sweep.evaluate, "rssr", ROCKER, "swing", phi=1.0)
-    refused("psi is one of a single pose, ask `evaluate`", sweep.summarise, "rssr", ROCKER, "psi")
+    refused("swing is an output of a whole turn: ask `summarise`", sweep.evaluate, "rssr", ROCKER, "swing", phi=1.0)
+    refused("psi is an output of a single pose: ask `evaluate`", sweep.summarise, "rssr", ROCKER, "psi")
     refused("a is a parameter: a dataset has it, and keep= repeats it", sweep.summarise, "rssr", ROCKER, "a, swing")
     refused("phi is a column of the table, keep= repeats it", sweep.evaluate, "rssr", ROCKER | {"phi": 1.0}, "phi")
 

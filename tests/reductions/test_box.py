@@ -63,7 +63,7 @@ def test_boxes_of_a_chain_are_those_of_its_stages() -> None:
     assert found["box_x1"] == pytest.approx(alone["box_x"], abs=2e-8) and found["box_z1"] == pytest.approx(
         alone["box_z"], abs=2e-8
     )
-    with pytest.raises(InputError, match=r"box_x is one of a stage, as box_x1"):
+    with pytest.raises(InputError, match=r"box_x exists for a stage, as box_x1"):
         sweep.summarise(["rssr", "guide"], {k: [x] for k, x in CHAIN.items()}, ["box_x"])
 
 

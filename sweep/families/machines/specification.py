@@ -279,7 +279,7 @@ def _relation(
         if key in table:
             return read(name, table, members, tools)
     if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
-        raise InputError(name, dict(table), f"one of {', '.join(RELATION_KINDS)}", where)
+        raise InputError(name, dict(table), f"one of {choices(' '.join(table), RELATION_KINDS)}", where)
     kind, given = next(iter(table.items()))
     if not isinstance(given, tuple) or not all(isinstance(part, str) for part in given):
         raise InputError(kind, given, "a list of names", where)
