@@ -59,7 +59,7 @@ class Finding(NamedTuple):
     def words(self) -> str:
         """The finding as one sentence with the number."""
         advice, side = self.advice, "below" if self.advice.negligible else "not below"
-        numbers = f"{advice.worst:.3g}, {side} {advice.threshold:.3g}{advice.unit and f' {advice.unit}'}"
+        numbers = f"{advice.worst:.3g}{advice.unit and f' {advice.unit}'}, {side} {advice.threshold:.3g}"
         if not (self.wanted or advice.negligible):
             return f"{advice.quantity[0].upper()}{advice.quantity[1:]} is large ({numbers}); ask for `{self.name}`"
         verdict = {

@@ -18,6 +18,7 @@ from sweep.report.dataset import Dataset, Row
 from sweep.report.quantities import ShownQuantity, change, number, quantity
 from sweep.report.scan import Scan
 from sweep.study import Limit, Study
+from sweep.study.parameter import definition
 
 ACTIVE = 1e-5  # distance of the optimum from a limit, relative to its size, below which the limit is active
 
@@ -213,7 +214,7 @@ def parameter_rows(data: Dataset, row: Row | None = None, digits: int = 6) -> li
             f"{x:+g}".replace("-", "−") if p.choices and math.isfinite(x) else shown.show(x, digits)
             for x in (value, other)
         ]
-        rows.append(ParameterRow(p.name, p.text, words[0], words[1], space, edge))
+        rows.append(ParameterRow(p.name, definition(p), words[0], words[1], space, edge))
     return rows
 
 

@@ -17,7 +17,7 @@ from sweep.errors import choices
 from sweep.families.base import Family
 from sweep.quantities.units import internal_unit
 from sweep.study.file import Faults, Key, Section, Seed, StudyFile, copied_table, holds, read_section
-from sweep.study.parameter import Entry, forms, missing_parameter, read_entry
+from sweep.study.parameter import Entry, definition, forms, missing_parameter, read_entry
 from sweep.study.sobol import DIMENSIONS
 from sweep.study.space import Axis, DesignSpace
 
@@ -176,7 +176,7 @@ def _check_names(
             faults.unknown((*key, name), known, f"parameter of {family.name}")
     for p in family.parameters:
         if p.name not in raw and p.default is None and p.name not in elsewhere:
-            needed = f"{p.text}: {forms(p)}" if key[0] == "reference" else missing_parameter(p)
+            needed = f"{definition(p)}: {forms(p)}" if key[0] == "reference" else missing_parameter(p)
             if not faults.misspelt((*key, p.name)):
                 faults.missing(((tables or {}).get(p.name, key[0]), *key[1:], p.name), needed)
 

@@ -187,7 +187,9 @@ def quantity(internal: str, allowed: Callable[[float], bool] = lambda x: True, k
         except units.UnitFault as fault:
             raise PydanticCustomError(QUANTITY, "{words}", {"words": str(fault)}) from None
         if not allowed(number):
-            raise PydanticCustomError(QUANTITY, "{words}", {"words": f"{kind}; {units.example(internal)}"})
+            raise PydanticCustomError(
+                QUANTITY, "{words}", {"words": kind if internal == "1" else f"{kind}; {units.example(internal)}"}
+            )
         return number
 
     return BeforeValidator(read)

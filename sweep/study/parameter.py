@@ -42,10 +42,14 @@ class FixedEntry(Section):
     unit: str | None = holds('a unit as a text, as "mm"')
 
 
+def definition(p: Parameter) -> str:
+    """Return what a parameter is, without what only tables without units need to say."""
+    return p.text.replace(GRAM, "")
+
+
 def missing_parameter(p: Parameter) -> str:
     """Describe a missing parameter: its meaning and the valid ways to write it."""
-    text = p.text.replace(GRAM, "")  # which is for tables without units
-    return f"{text}: {forms(p)}, or an axis {{ from = ..., to = ..., count = ...{_unit_form(p)} }}"
+    return f"{definition(p)}: {forms(p)}, or an axis {{ from = ..., to = ..., count = ...{_unit_form(p)} }}"
 
 
 def read_entry(p: Parameter, raw: object, key: Key, faults: Faults, sampled: bool) -> Entry | None:
@@ -146,7 +150,7 @@ def _unit(p: Parameter, unit: str | None, raw: Mapping[str, Any], key: Key, faul
 def _checked(p: Parameter, written: float, unit: str | None, value: float, key: Key, faults: Faults) -> float:
     faults.within_turn(key, written, unit)
     if p.sign and (math.isnan(value) or p.wrong_sign(value)):
-        faults.value(key, written, f"a {p.sign} {p.unit} ({p.text})")
+        faults.value(key, written, f"a {p.sign} {p.unit} ({definition(p)})")
     if p.choices is not None and value not in p.choices:
         faults.value(key, written, p.choice)
     return float(value)

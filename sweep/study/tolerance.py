@@ -37,7 +37,7 @@ def read_tolerance(section: ToleranceSection, file: StudyFile, family: Family) -
         file.faults.missing(("tolerance", "lengths"), needed, instead="angles")
     samples = Tolerance.samples if section.samples is None else section.samples
     if not 2 <= samples <= MOST_SAMPLES or samples & (samples - 1):
-        allowed = f"a power of two, 2 to {MOST_SAMPLES}: a Sobol sample keeps its balance only so"
+        allowed = f"a power of two, 2 to {MOST_SAMPLES}: only then is a Sobol sample balanced"
         file.faults.value(("tolerance", "samples"), samples, allowed)
     single = tuple(_of_patterns(section.own, file, family).items())
     return Tolerance(section.lengths or 0.0, section.angles or 0.0, section.robust, single, samples)

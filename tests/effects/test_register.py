@@ -127,8 +127,8 @@ def test_a_large_axial_force_is_said_where_nobody_asks_for_it():
     full = extended(bare, ["psi"])
     words = [finding.words for finding in findings(bare, full, designs(full, 4), ["psi"])]
     (found,) = [line for line in words if line.startswith("Axial force is large (")]
-    assert float(found.split("(")[1].split(",")[0]) > 0.05
-    assert found.endswith("not below 0.05 of the coupler force); ask for `pressure`")
+    assert float(found.split("(")[1].split(" ")[0]) > 0.05
+    assert found.endswith(" of the coupler force, not below 0.05); ask for `pressure`")
 
 
 def test_effects_of_members_are_told_by_their_names_with_their_shares_of_the_cost():

@@ -227,6 +227,8 @@ def test_faults_of_bodies_and_loads_name_the_place_and_what_is_right(tmp_path, t
 def test_missing_mass_is_told_without_the_gram_of_tables_in_tonnes(tmp_path):
     fault = str(faults(tmp_path, HEAD + "[bodies]\n" + BODIES.replace('m_crank2 = "10 g"\n', "")))
     assert "mass of the crank" in fault and "a gram is" not in fault
+    fault = str(faults(tmp_path, HEAD + "[bodies]\n" + BODIES.replace('m_crank2 = "10 g"', 'm_crank2 = "-10 g"')))
+    assert "a non-negative mass (mass of the crank;" in fault and "a gram is" not in fault
 
 
 def test_an_input_given_twice_is_a_fault(tmp_path):

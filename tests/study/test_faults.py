@@ -84,7 +84,7 @@ FAULTS = {
     "empty chain": ('family = "rssr"', "chain = []", ["mechanism.chain = []", "a list of names"]),
     "misspelt chain": ('family = "rssr"', 'chian = ["rssr"]', ["mechanism.chian", "did you mean 'chain'?"]),
     "speed without unit": ('"7000 rpm"', "7000", ["scene.speed = 7000", "7000 rpm"]),
-    "speed in strokes": ('"7000 rpm"', '"7000 1/min"', ["scene.speed = '7000 1/min'", "rpm"]),
+    "speed in strokes": ('"7000 rpm"', '"7000 spm"', ["scene.speed = '7000 spm'", "rpm"]),
     "speed misspelt": ('"7000 rpm"', '"7000 rpmm"', ["scene.speed", "did you mean 'rpm'?"]),
     "speed of zero": ('"7000 rpm"', '"0 rpm"', ["scene.speed = '0 rpm'", "non-zero"]),
     "wanted output unknown": ('"swing"', '"swign"', ["scene.want[1] = 'swign'", "did you mean 'swing'?"]),
