@@ -101,7 +101,7 @@ m_coupler = "20 g"
         ("m_coupler", "inertia_rocker", "allowed: j_rocker_xx, j_rocker_xy, j_rocker_xz, j_rocker_yy, j_"),
         ("m_coupler", "mass_coupler", "effects of rssr; allowed: m_coupler, did you mean 'm_coupler'?"),
         ("m_coupler", "friction_a", "unknown input of the effects of rssr; allowed: mu_a"),
-        ('"kinetostatics"', '"stroke"', "; stroke is one of rssp, guide, swivel, slider_crank, "),
+        ('"kinetostatics"', '"stroke"', "; stroke is an output of rssp, guide, swivel, slider_crank, "),
         ('"kinetostatics"', '"psi"', "ask `evaluate`, or for one of max_abs_psi, max_psi, min_psi, range_psi, rms_psi"),
     ],
 )  # fmt: skip
