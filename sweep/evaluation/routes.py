@@ -30,7 +30,7 @@ from sweep.numerics.records import Indices
 from sweep.quantities.kinds import Extent, GeneralRoute, LargestLength, Margin, Negative, Quantity, TimingOf, group_of
 from sweep.quantities.resolve import resolve
 from sweep.reductions.margins import NAMES as MARGINS
-from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
+from sweep.reductions.margins import LoopMargin, combined, margin_suffixes, margins
 from sweep.reductions.sampling import on_closed_turn
 from sweep.reductions.steps import NO_JUMPS, applying_step, beyond_motion, group_ns
 from sweep.reductions.turn import margin_group
@@ -308,23 +308,17 @@ def _of_member(m: Member, inner: Route, designs: Array, accuracy: Accuracy, wind
 def _margins(machine: Machine, designs: Array, accuracy: Accuracy, window: Window) -> Columns:
     """Compute the margin of the weakest member; a member driven by another is tested at the angles that it gets."""
     status = np.zeros(len(designs), np.uint8)
-    columns: Columns = {}
-    suffixes: list[str] = []
+    found: list[LoopMargin] = []
     for m in machine.members:
         loops = tuple(loop.stage for loop in machine.every(Assembly) if m.own(loop.stage) or loop.stage == f"{m.name}.")
         if not loops:
             continue
         if m.driver is None:  # its crank turns fully with any gear ratio
-            results = _by_itself(m, MARGINS, designs, accuracy, None)
-            member_status, zeros = results["status"], np.zeros(len(designs))
-            for name in MARGINS:
-                columns[f"{name}{m.name}"] = results[name]
-                columns[f"{error_of(name)}{m.name}"] = results.get(error_of(name), zeros)
-            suffixes.append(m.name)
+            columns = _by_itself(m, MARGINS, designs, accuracy, None)
+            found.append(LoopMargin.of(columns, accuracy))
+            member_status = columns["status"]
         else:
-            results = margins(machine, designs, loops, accuracy)
-            member_status = results.pop("status")
-            columns |= results
-            suffixes += loops
+            driven, member_status = margins(machine, designs, loops, accuracy)
+            found += driven.values()
         status = np.where(status == st.OK, member_status, status).astype(np.uint8)
-    return with_transmission(combined(columns, tuple(suffixes)), ("",)) | {"status": status}
+    return combined(found).columns() | {"status": status}

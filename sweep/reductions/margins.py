@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from kernels import status as st
 from kernels.types import TWO_PI, Status
-from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step
+from sweep.families.base import Accuracy, Array, Columns, Family, Stage, Step, floats
 from sweep.families.capabilities import Assembly
-from sweep.families.names import is_flag
-from sweep.numerics.records import Indices, put
+from sweep.numerics.records import Indices, Mask, put
 from sweep.quantities.dimensions import near_unit_size
 from sweep.quantities.kinds import Request
 from sweep.reductions import fused
@@ -17,7 +20,6 @@ from sweep.reductions.extrema import true_extrema
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, pose_columns, turn
 
 NAMES = ("rotatable", "margin", "max_pressure_angle")
-TRANSMISSION = "least_transmission_angle"
 # Relative accuracy of the smallest discriminants unless a finer one is asked for: their sign is what matters.
 TARGET = 1e-10
 END_TARGET = 1e-4  # of the search for the end of a motion, which only has to meet the missing poses
@@ -32,9 +34,56 @@ def margin_suffixes(family: Family) -> tuple[str, ...]:
     return tuple(loop.stage for loop in family.every(Assembly))
 
 
+class LoopMargin(NamedTuple):
+    """Margin of one loop, or of the weakest of several, each (n,).
+
+    ``rotatable`` tells whether it turns fully; ``margin`` is the smallest cos^2(pressure angle), negative where it does
+    not turn, and nan where an earlier stage does not; ``pressure`` is the largest pressure angle [rad], nan unless it
+    turns.
+    """
+
+    rotatable: Mask
+    margin: Array
+    err_margin: Array
+    pressure: Array
+    err_pressure: Array
+
+    @classmethod
+    def unknown(cls, count: int) -> LoopMargin:
+        """Make a record of loops of which nothing is known."""
+        return cls(np.zeros(count, np.bool_), *np.full((4, count), np.nan))
+
+    @classmethod
+    def of(cls, columns: Columns, accuracy: Accuracy) -> LoopMargin:
+        """Read the columns `NAMES`; their errors meet the accuracy where none are given."""
+        margin, pressure = floats(columns, *NAMES[1:])
+        share = accuracy.target or TARGET
+        met: Columns = {"err_margin": share * np.abs(margin), "err_max_pressure_angle": share * np.abs(pressure)}
+        err_margin, err_pressure = floats(met | columns, *met)
+        return cls(np.asarray(columns["rotatable"], np.bool_), margin, err_margin, pressure, err_pressure)
+
+    def columns(self) -> Columns:
+        """Return the columns by their names, errors and the least transmission angle included.
+
+        That angle is 90 degrees less the largest pressure angle.  It is computed from cosine and sine of the pressure
+        angle, so that it stays exact where the linkage nearly locks.
+        """
+        cosine = np.sqrt(np.where(self.margin > 0.0, self.margin, np.nan))
+        return {
+            "rotatable": self.rotatable,
+            "err_rotatable": np.zeros(self.rotatable.size),
+            "margin": self.margin,
+            "err_margin": self.err_margin,
+            "max_pressure_angle": self.pressure,
+            "err_max_pressure_angle": self.err_pressure,
+            "least_transmission_angle": np.arctan2(cosine, np.sin(self.pressure)),
+            "err_least_transmission_angle": self.err_pressure,
+        }
+
+
 def margins(
     family: Family, designs: Array, suffixes: tuple[str, ...], accuracy: Accuracy, valued: bool = True
-) -> Columns:
+) -> tuple[dict[str, LoopMargin], Status]:
     """Compute whether the stages turn fully, their smallest cos^2(pressure angle) and largest pressure angle.
 
     Parameters
@@ -47,62 +96,38 @@ def margins(
 
     Returns
     -------
-    Columns
-        per suffix ``rotatable``, ``margin`` (negative where the stage does not turn, nan where an earlier one does
-        not), ``max_pressure_angle`` [rad] (nan unless it turns), each with its ``err_``; and ``status``.
+    margins : by suffix
+    status : (n,)
 
     Notes
     -----
     The margin of a non-rotatable design is the smallest discriminant over 4 b^2 c^2, or over b^2 if it is a squared
     length: where the links reach this equals cos^2(pressure angle), so the margin is smooth across zero.
     """
-    n = len(designs)
-    columns: Columns = {}
-    status = np.zeros(n, np.uint8)
+    found = {suffix: LoopMargin.unknown(len(designs)) for suffix in suffixes}
+    status = np.zeros(len(designs), np.uint8)
     looked = FEW if not valued else accuracy.samples or 0
-    for suffix in suffixes:
+    for suffix, margin in found.items():
         alive = np.flatnonzero(status == st.OK)
         with np.errstate(all="ignore"):  # invalid values and overflows have their status
-            part = _stage_margin(family, designs[alive], suffix, accuracy, looked)
-        status[alive] = part["status"]
-        for name in NAMES:
-            for key in (f"{name}{suffix}", f"err_{name}{suffix}"):
-                whole = np.zeros(n, np.bool_) if is_flag(key) else np.full(n, np.nan)
-                whole[alive] = part[key]
-                columns[key] = whole
-    return columns | {"status": status}
+            part, status[alive] = _of_loop(family, designs[alive], suffix, accuracy, looked)
+        put(margin, alive, part)
+    return found, status
 
 
-def combined(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
+def combined(margins: Iterable[LoopMargin]) -> LoopMargin:
     """Combine the margins of a chain's stages: the weakest stage decides."""
-    rotatable = np.logical_and.reduce([columns[f"rotatable{s}"] for s in suffixes])
-    result: Columns = {"rotatable": rotatable, "err_rotatable": np.zeros(rotatable.size)}
-    for name, sign in (("margin", -1.0), ("max_pressure_angle", 1.0)):
-        values = np.stack([np.asarray(columns[f"{name}{s}"], np.float64) for s in suffixes])
-        errors = np.stack([np.asarray(columns[f"err_{name}{s}"], np.float64) for s in suffixes])
-        which = np.where(np.isnan(values), -np.inf, sign * values).argmax(axis=0)[None, :]
-        result[name] = np.take_along_axis(values, which, axis=0)[0]
-        result[f"err_{name}"] = np.take_along_axis(errors, which, axis=0)[0]
+    stages = LoopMargin(*(np.stack(column) for column in zip(*margins, strict=True)))
+    rotatable: Mask = np.logical_and.reduce(stages.rotatable)
+    every = np.arange(rotatable.size)
+    least = np.where(np.isnan(stages.margin), np.inf, stages.margin).argmin(axis=0), every
+    most = np.where(np.isnan(stages.pressure), -np.inf, stages.pressure).argmax(axis=0), every
+    margin, err_margin = stages.margin[least], stages.err_margin[least]
     # Where a stage has no margin because something else ends its motion, the weakest is unknown.
-    unknown = ~rotatable & np.greater(result["margin"], result["err_margin"])
-    result["margin"][unknown], result["err_margin"][unknown] = np.nan, np.nan
-    result["max_pressure_angle"][~rotatable] = np.nan
-    result["err_max_pressure_angle"][~rotatable] = np.nan
-    return result
-
-
-def with_transmission(columns: Columns, suffixes: tuple[str, ...]) -> Columns:
-    """Add the least transmission angle of each suffix to the columns: 90 degrees less the largest pressure angle.
-
-    It is computed from cosine and sine of the pressure angle, so that it stays exact where the linkage nearly locks.
-    """
-    for suffix in suffixes:
-        margin = np.asarray(columns[f"margin{suffix}"], np.float64)
-        pressure = np.asarray(columns[f"max_pressure_angle{suffix}"], np.float64)
-        cosine = np.sqrt(np.where(margin > 0.0, margin, np.nan))
-        columns[f"{TRANSMISSION}{suffix}"] = np.arctan2(cosine, np.sin(pressure))
-        columns[f"err_{TRANSMISSION}{suffix}"] = columns[f"err_max_pressure_angle{suffix}"]
-    return columns
+    unknown = ~rotatable & (margin > err_margin)
+    margin[unknown], err_margin[unknown] = np.nan, np.nan
+    pressure, err_pressure = (np.where(rotatable, x[most], np.nan) for x in (stages.pressure, stages.err_pressure))
+    return LoopMargin(rotatable, margin, err_margin, pressure, err_pressure)
 
 
 def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Stage] | None:
@@ -114,21 +139,20 @@ def own_step(family: Family, suffix: str, accuracy: Accuracy) -> tuple[Step, Sta
     return next(((step, first) for step in able if set(NAMES) <= {o.name for o in step.provides}), None)
 
 
-def _stage_margin(family: Family, designs: Array, suffix: str, accuracy: Accuracy, looked: int) -> Columns:
+def _of_loop(
+    family: Family, designs: Array, suffix: str, accuracy: Accuracy, looked: int
+) -> tuple[LoopMargin, NDArray[np.generic]]:
     own = own_step(family, suffix, accuracy)
     if own is None:
         return _from_poses(family, designs, suffix, looked, min(TARGET, accuracy.target or TARGET))
     step, stage = own
     found = step.run(stage.designs(designs), frozenset(NAMES), accuracy)
-    columns: Columns = {f"{name}{suffix}": found[name] for name in NAMES}
-    columns[f"err_rotatable{suffix}"] = np.zeros(len(designs))
-    for name in NAMES[1:]:
-        values = np.asarray(found[name], np.float64)
-        columns[f"err_{name}{suffix}"] = found.get(f"err_{name}", np.abs(values) * (accuracy.target or TARGET))
-    return columns | {"status": found["status"]}
+    return LoopMargin.of(found, accuracy), found["status"]
 
 
-def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target: float) -> Columns:
+def _from_poses(
+    family: Family, designs: Array, suffix: str, looked: int, target: float
+) -> tuple[LoopMargin, NDArray[np.generic]]:
     """Compute the margin from the family's discriminant, refined unless ``looked`` poses are enough."""
     designs, _ = near_unit_size(family, designs)  # no discriminant overflows
     loop = next(found for found in family.every(Assembly) if found.stage == suffix)
@@ -158,15 +182,8 @@ def _from_poses(family: Family, designs: Array, suffix: str, looked: int, target
     margin = np.where(turns, np.cos(pressure) ** 2, least.value / scale)
     # d(angle) = d(cos^2) / sin(2 angle), and sqrt(d(cos^2)) where the linearisation fails.
     err_angle = np.minimum(err_margin / np.abs(np.sin(2.0 * pressure)), np.sqrt(err_margin)) + 2.0**-51
-    return {
-        f"rotatable{suffix}": turns,
-        f"err_rotatable{suffix}": np.zeros(len(designs)),
-        f"margin{suffix}": margin,
-        f"err_margin{suffix}": err_margin + 2.0**-51,
-        f"max_pressure_angle{suffix}": pressure,
-        f"err_max_pressure_angle{suffix}": np.where(turns, err_angle, np.nan),
-        "status": status,
-    }
+    err_pressure = np.where(turns, err_angle, np.nan)
+    return LoopMargin(turns, margin, err_margin + 2.0**-51, pressure, err_pressure), status
 
 
 def _ended(family: Family, designs: Array, loop: Assembly, status: Status) -> Indices:

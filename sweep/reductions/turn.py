@@ -18,7 +18,7 @@ from sweep.quantities.kinds import LimitPosition, Margin, Quantity, Reduced, Req
 from sweep.quantities.resolve import STAY, resolve
 from sweep.reductions.extrema import true_extrema
 from sweep.reductions.fused import sampled_maxima
-from sweep.reductions.margins import combined, margin_suffixes, margins, with_transmission
+from sweep.reductions.margins import combined, margin_suffixes, margins
 from sweep.reductions.sampling import DESIGN_STATUS, Extremum, blocks, sample_turn, variable
 from sweep.reductions.window import Window, window_angle
 
@@ -28,33 +28,26 @@ END_TARGET = 1e-12  # of the ends of the stroke that a window angle is measured 
 
 
 def margin_group(family: Family, designs: Array, names: Sequence[str], accuracy: Accuracy) -> Columns:
-    """Compute rotatability, margins and pressure angles of the stages that the names need; of all without names."""
-    asked = [one for name in names if isinstance(one := resolve(family, name), Margin)]
+    """Compute rotatability, margins and pressure angles by name; without names the status of all stages.
+
+    In a machine "needle.2" is a stage of a member, "needle." its weakest one.
+    """
+    asked = {name: one for name in names if isinstance(one := resolve(family, name), Margin)}
     known = margin_suffixes(family)
-    valued = any(one.kind == "margin" for one in asked)
-    if any("." in one.stage for one in asked):
-        return _of_members(family, designs, asked, known, accuracy, valued)
-    last = max((known.index(one.stage) if one.stage else len(known) - 1 for one in asked), default=len(known) - 1)
-    suffixes = known[: last + 1]
-    columns = margins(family, designs, suffixes, accuracy, valued)
-    if suffixes != ("",) and suffixes == known:
-        columns |= combined(columns, suffixes)
-        suffixes = ("", *suffixes)
-    return with_transmission(columns, suffixes)
-
-
-def _of_members(
-    family: Family, designs: Array, asked: Sequence[Margin], known: Sequence[str], accuracy: Accuracy, valued: bool
-) -> Columns:
-    """Compute margins of a machine's members under their dotted names; a chain's weakest stage decides."""
-    members = {f"{one.stage.rpartition('.')[0]}." for one in asked}
-    suffixes = tuple(s for s in known if any(s.startswith(member) for member in members))
-    columns = with_transmission(margins(family, designs, suffixes, accuracy, valued), suffixes)
-    for one in asked:
-        loops = tuple(s for s in suffixes if s == one.stage or (one.stage.endswith(".") and s.startswith(one.stage)))
-        found = columns if loops == (one.stage,) else with_transmission(combined(columns, loops), ("",))
-        key = f"{one.kind}{one.stage if found is columns else ''}"
-        columns |= {one.output.name: found[key], f"err_{one.output.name}": found[f"err_{key}"]}
+    members = {f"{one.stage.rpartition('.')[0]}." for one in asked.values() if "." in one.stage}
+    if members:
+        suffixes = tuple(s for s in known if any(s.startswith(member) for member in members))
+    else:
+        stages = [known.index(one.stage) if one.stage else len(known) - 1 for one in asked.values()]
+        suffixes = known[: max(stages, default=len(known) - 1) + 1]
+    valued = any(one.kind == "margin" for one in asked.values())
+    found, status = margins(family, designs, suffixes, accuracy, valued)
+    columns: Columns = {"status": status}
+    for name, one in asked.items():
+        if one.stage not in found:
+            found[one.stage] = combined(found[s] for s in suffixes if s.startswith(one.stage))
+        values = found[one.stage].columns()
+        columns |= {name: values[one.kind], f"err_{name}": values[f"err_{one.kind}"]}
     return columns
 
 
