@@ -88,7 +88,12 @@ def is_memory_full(error: BaseException) -> bool:
 
 def how_many(count: int, thing: str, ending: str = "s") -> str:
     """Write a count with its noun, ``1 chunk`` or ``3 chunks``; ``ending`` is that of the plural."""
-    return f"{count} {thing}{'' if count == 1 else ending}"
+    return f"{grouped(count)} {thing}{'' if count == 1 else ending}"
+
+
+def grouped(count: float) -> str:
+    """Write a count with its digits in groups of three from 10 000 on, and as a power of ten from 10^15 on."""
+    return f"{int(count):,}".replace(",", " ") if 10_000 <= count < 1e15 else f"{count:.6g}"
 
 
 class StudyError(LinksweepError, ValueError):

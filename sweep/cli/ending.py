@@ -14,7 +14,7 @@ import numpy as np
 from kernels import status as codes
 from sweep.chunks.plan import spread_designs
 from sweep.dataset.reading import best
-from sweep.errors import INFEASIBLE, how_many
+from sweep.errors import INFEASIBLE, grouped, how_many
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs
 from sweep.families.base import Angles, Interval
@@ -60,7 +60,7 @@ def ending(folder: Path) -> Ending:
     data = read_dataset(folder)
     feasible = data.counts.get(codes.OK, 0)
     swept = f"{data.study.name}: {how_many(data.designs, 'design')}"
-    lines = [f"{swept}, {feasible} within all limits{_best_of_sweep(data, feasible)}"]
+    lines = [f"{swept}, {grouped(feasible)} within all limits{_best_of_sweep(data, feasible)}"]
     optimum = data.optimum
     if optimum is not None:
         missed = int(optimum.get("status", 0)) == codes.LIMIT_EXCEEDED
@@ -166,7 +166,7 @@ def _nearest_of_space(data: Dataset) -> list[str]:
     study = data.study
     if not study.limits:
         status, count = max(((s, n) for s, n in data.counts.items() if s != codes.OK), key=lambda item: item[1])
-        return [f"no design has all that is wanted; {count} of {data.designs}: {meaning(status)}"]
+        return [f"no design has all that is wanted; {grouped(count)} of {grouped(data.designs)}: {meaning(status)}"]
     designs = spread_designs(study, LOOKED_AT)
     if study.fit is not None and len(designs):
         designs, made = fit_line(study.family, designs, study.fit, study.window)

@@ -25,8 +25,9 @@ from sweep.engine.estimate import (
     estimate,
     other_accuracies,
     searches,
+    size,
 )
-from sweep.errors import how_many
+from sweep.errors import grouped, how_many
 from sweep.evaluation.statuses import meaning
 from sweep.evaluation.summaries import design_outputs, output
 from sweep.families.base import Angles, Array, Family
@@ -90,7 +91,7 @@ def plan_lines(study: Study, cost: Estimate, others: Sequence[tuple[str, float]]
     kind = "every combination" if study.space.kind == "product" else "Sobol sample"
     large = without_minus(study.objective.output) if study.objective is not None else None
     costs = [
-        ("chunks", f"{cost.chunks} of {how_many(min(cost.chunk_size, cost.designs), 'design')}"),
+        ("chunks", f"{grouped(cost.chunks)} of {how_many(min(cost.chunk_size, cost.designs), 'design')}"),
         ("rows kept", f"{_kept(cost)} ({study.output.keep}, {study.output.dtype})"),
         ("memory", size(cost.memory_bytes)),
         ("disk", f"{size(cost.disk_bytes)}, allowed {size(study.budget.disk_bytes)}"),
@@ -339,11 +340,3 @@ def _axis(axis: Axis) -> str:
     low, high = axis.low / axis.factor, axis.high / axis.factor
     count = "" if axis.values is None else f", {how_many(axis.count, 'value')}"
     return f"{low:g} to {high:g}{unit}{count}{', log' if axis.scale == 'log' else ''}"
-
-
-def size(count: float) -> str:
-    """Format a number of bytes in words."""
-    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
-        if count >= scale:
-            return f"{count / scale:.3g} {unit}"
-    return f"{count:.0f} bytes"

@@ -12,7 +12,7 @@ from numba.core.event import Event, Listener, install_listener
 
 from sweep.chunks.cascade import CALL_SECONDS, Dropped, levels
 from sweep.chunks.plan import Pilot, choose_chunk_size, describe_columns, pilot, pilot_at, row_bytes
-from sweep.errors import BudgetError, how_many
+from sweep.errors import BudgetError, grouped, how_many
 from sweep.evaluation.summaries import FEWEST_SAMPLES, FINEST_TARGET, MOST_SAMPLES
 from sweep.families.base import Array
 from sweep.families.names import is_error, is_flag
@@ -268,12 +268,11 @@ def check_budget(study: Study, cost: Estimate) -> None:
     if cost.seconds > study.budget.seconds:
         over.append(f"time about {duration(cost.seconds)}; allowed: {duration(study.budget.seconds)} (budget.time)")
     if cost.disk_bytes > study.budget.disk_bytes:
-        allowed = study.budget.disk_bytes
-        over.append(f"disk about {cost.disk_bytes / 1e9:.3g} GB; allowed: {allowed / 1e9:.3g} GB (budget.disk)")
+        over.append(f"disk about {size(cost.disk_bytes)}; allowed: {size(study.budget.disk_bytes)} (budget.disk)")
     if over:
         way_out = "take fewer values, raise the budget in the study file, or force it"
-        size = f"{how_many(cost.designs, 'design')} on {how_many(cost.jobs, 'worker')}"
-        raise BudgetError(f"{study.path}: over the budget with {size}: {'; '.join(over)}; {way_out}")
+        what = f"{how_many(cost.designs, 'design')} on {how_many(cost.jobs, 'worker')}"
+        raise BudgetError(f"{study.path}: over the budget with {what}: {'; '.join(over)}; {way_out}")
 
 
 def duration(seconds: float) -> str:
@@ -284,6 +283,14 @@ def duration(seconds: float) -> str:
     if seconds < 120.0:
         return f"{float(f'{seconds:.2g}'):g} s"
     return f"{seconds / 60.0:.3g} min" if seconds < 7200.0 else f"{seconds / 3600.0:.3g} h"
+
+
+def size(count: float) -> str:
+    """Write a number of bytes in words; budgets are written in GB, so that is the largest unit."""
+    for unit, scale in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= scale:
+            return f"{grouped(float(f'{count / scale:.3g}'))} {unit}"
+    return f"{count:.0f} bytes"
 
 
 class Compiled(Listener):

@@ -43,6 +43,17 @@ class Faults:
         self.lines: list[str] = []
         self._files, self._places = files, places
         self._misspelt: set[Key] = set()
+        self._known: int | None = None  # faults that were there before a mechanism was guessed
+        self._fits = True
+
+    def guess(self) -> None:
+        """Mark all further faults as those of a mechanism that is guessed, since its name is misspelt."""
+        self._known = len(self.lines)
+
+    @property
+    def told(self) -> list[str]:
+        """The faults to be printed: without those of a guessed mechanism whose names are not those of the file."""
+        return self.lines if self._fits else self.lines[: self._known]
 
     def value(self, key: Key, value: object, allowed: str) -> None:
         """Report a value that is not allowed."""
@@ -53,6 +64,7 @@ class Faults:
     def missing(self, key: Key, needed: str, instead: str = "") -> None:
         """Report a missing key, unless it or the key ``instead`` was reported as misspelt."""
         if not self.misspelt(key) and not self.misspelt((*key[:-1], instead)):
+            self._fits &= self._known is None
             self._add(key, f"{spelled(key)} is missing; needed: {needed}")
 
     def misspelt(self, key: Key) -> bool:
@@ -73,6 +85,7 @@ class Faults:
 
     def unknown_name(self, key: Key, what: str, allowed: str) -> None:
         """Report a key that should name a known item."""
+        self._fits &= self._known is None
         self._add(key, f"{spelled(key)}: unknown {what}; allowed: {allowed}")
 
     def number(self, text: str, internal: str, key: Key) -> float | None:
@@ -147,7 +160,7 @@ class StudyFile:
             lists all faults found so far.
         """
         if self.faults.lines:
-            raise StudyError(str(self.path), self.faults.lines)
+            raise StudyError(str(self.path), self.faults.told)
 
 
 def copied_table(data: Mapping[str, Any], key: tuple[str, ...]) -> dict[str, Any] | None:

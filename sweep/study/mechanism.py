@@ -213,13 +213,15 @@ def _family(names: tuple[str, ...], data: Mapping[str, Any], faults: Faults) -> 
     """Return the family or chain, or None with a fault for each unknown name or for an impossible chain.
 
     A misspelt family is a fault; the other tables are checked against the closest match, so that one run finds all
-    faults.
+    faults.  If they name what it does not have, or lack what it needs, it is the wrong match and its faults are none.
     """
     single = "family" in data.get("mechanism", {}) if names else False
     unknown = [k for k, name in enumerate(names) if name not in NAMES]
     for k in unknown:
         key: Key = ("mechanism", "family") if single else ("mechanism", "chain", k)
         faults.value(key, names[k], f"one of {choices(names[k], NAMES)}")
+    if unknown:
+        faults.guess()
     guessed = tuple(closest(name, NAMES) if name not in NAMES else name for name in names)
     if not guessed or None in guessed:
         return None

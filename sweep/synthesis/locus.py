@@ -138,6 +138,14 @@ LOCI = (
 )  # fmt: skip
 
 
+FAMILIES = tuple(dict.fromkeys(form.family for form in LOCI))
+
+
+def unknown_family(family: object, known: tuple[str, ...]) -> InputError:
+    """Make the error about a family that a synthesis does not know."""
+    return InputError("family", family, f"{' or '.join(known)}{nearest(str(family), known)}", "synthesis")
+
+
 def locus(family: str, names: tuple[str, ...]) -> Locus:
     """Return the form of a requirement that its column names select.
 
@@ -148,8 +156,7 @@ def locus(family: str, names: tuple[str, ...]) -> Locus:
     """
     of_family = [form for form in LOCI if form.family == family]
     if not of_family:
-        families = tuple(dict.fromkeys(form.family for form in LOCI))
-        raise InputError("family", family, f"{' or '.join(families)}{nearest(str(family), families)}", "synthesis")
+        raise unknown_family(family, FAMILIES)
     selected = [form for form in of_family if form.chosen_by in names]
     # A column shared with another selected form selects nothing.
     selected = [x for x in selected if not any(x.chosen_by in y.parameter_names for y in selected if y != x)]

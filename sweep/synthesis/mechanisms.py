@@ -20,7 +20,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.evaluation.tables import Sheet, Table, design_matrix, index_of, parameter_units, refuse_rows
 from sweep.families import family as find_family
 from sweep.families.base import Accuracy, Array, Parameter
-from sweep.synthesis.locus import Locus, LocusSolutions, locus
+from sweep.synthesis.locus import FAMILIES, Locus, LocusSolutions, locus, unknown_family
 
 _LIMITS = ("phi_ext", "phi_fold", "psi_ext", "psi_fold", "swing", "phi0", "margin", "max_pressure_angle")
 _EXACT = Accuracy(target=1e-12)
@@ -128,6 +128,8 @@ def synthesise(
         raise InputError("max_pressure_angle", max_pressure_angle, "an angle between 0 and pi/2", "synthesise")
     if family == CENTRAL_SLOT.name:  # its mechanisms lie on no locus
         return central_slots(in_radians(CENTRAL_SLOT, table, angles))
+    if family not in FAMILIES:
+        raise unknown_family(family, (*FAMILIES, CENTRAL_SLOT.name))
     form = locus(family, plain_names(table))
     table = in_radians(form, table, angles)
     matrix = form.read(table)

@@ -110,6 +110,17 @@ def test_limits_say_by_how_much_they_are_missed(opened):
     assert row.locator(".state.missed").count() >= 1
 
 
+@pytest.mark.parametrize("width", [390, 1400])
+def test_line_below_the_heading_of_the_outputs_runs_over_all_columns(opened, width):
+    """A narrow report leaves out columns without a heading; on this page only their heading went."""
+    page = opened(width=width)
+    page.click("[aria-label='remove reference']")
+    until(lambda: page.locator("#outputs th").all_text_contents() == ["output", ""])
+    right = "rows => rows.map((row) => row.lastElementChild.getBoundingClientRect().right)"
+    heading, *values = page.locator("#outputs tr").evaluate_all(right)
+    assert values and all(abs(heading - value) < 1.0 for value in values)  # px; a column is some 100 wide
+
+
 def test_pins_stand_beside_and_undo_goes_back(opened):
     page = opened()
     first = shown(page, "max_abs_d2psi")

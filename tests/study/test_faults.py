@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
 from sweep.errors import StudyError
+from sweep.families import NAMES
 from sweep.study import load_study
 
 RIGHT = """
@@ -286,6 +288,16 @@ def test_several_faults_in_one_axis_are_told_at_once(tmp_path: Path) -> None:
 def test_a_misspelt_family_does_not_hide_the_other_faults(tmp_path: Path) -> None:
     messages = faults_of(RIGHT.replace('"rssr"', '"rsrs"').replace("count = 5", "count = 0"), tmp_path)
     assert [message.split()[1] for message in messages] == ["mechanism.family", "design.c.count"]
+
+
+@pytest.mark.parametrize("chain", ['["rssr", "guidee"]', '["rsr"]', '["rssr", "four_barr", "guide"]'])
+def test_a_misspelt_family_whose_closest_match_does_not_fit_is_one_fault(chain: str, tmp_path: Path) -> None:
+    """The match has other parameters than the tables: each of them was a fault of its own, and none was one."""
+    text = RIGHT.replace('family = "rssr"', f"chain = {chain}").replace("[objective]", "[objectiv]")
+    text = text.replace("[limits]", '[bodies]\nm_slide = "20 g"\nmass_of_tool9 = "1 g"\n[limits]')
+    messages = faults_of(text, tmp_path)
+    (index,) = (k for k, name in enumerate(json.loads(chain)) if name not in NAMES)
+    assert [message.split()[1] for message in messages] == ["objectiv:", f"mechanism.chain[{index}]"]
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,8 @@ from tests.synthesis.test_reference import requirements
         ("rssr", {"phi1": None}, "phi1.*or swing, phi0, psi1"),
         ("rssr", {"phi1": None, "phi_1": 1.0}, "requirement"),
         ("rssr", {"psi1": 1.0}, "requirement"),
-        ("guide", {}, "rssr or rssp"),
+        ("guide", {}, "rssr or rssp or slotted"),
+        ("sloted", {}, "did you mean 'slotted'"),
         ("rssp", {"stroke": 0.0}, "not zero"),
     ],
 )

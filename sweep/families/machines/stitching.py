@@ -92,7 +92,8 @@ def read_sewing(name: str, table: dict[str, Any], known: Mapping[str, Any]) -> S
     entering = tuple(known[one] for one in moments if isinstance(known[one], Entering))
     if len(taking) != 1 or len(entering) + 1 != len(moments):
         raise InputError("sew", table["sew"], "one moment A with fields of work (take), any of B and C (enter)", where)
-    speeds = tuple(length("speeds", speed, where, "a speed") for speed in table.get("speeds", ()))
+    listed = table["speeds"] if isinstance(table.get("speeds"), tuple) else ()
+    speeds = tuple(length("speeds", speed, where, "a speed") for speed in listed)
     if len(speeds) < 2 or any(b <= a for a, b in pairwise(speeds)):
         raise InputError("speeds", table.get("speeds"), "speeds of the main shaft, growing, at least two", where)
     between = "the least and the largest clearance at A"

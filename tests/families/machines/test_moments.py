@@ -12,6 +12,7 @@ from mpmath import mp, mpf
 
 import sweep
 from kernels import status as st
+from sweep.errors import InputError
 from sweep.evaluation.tables import design_matrix
 from sweep.families import family
 from sweep.families.machines.crossings import Poses
@@ -213,3 +214,11 @@ def test_room_of_a_passage_that_nearly_touches_is_known_no_better_than_the_rise_
     names = [output.name for output in machine.relations[-1].numbers]
     got = sweep.summarise(machine, hand_made.DESIGN, ["a_rise", *names], accuracy=1e-14).iloc[0]
     assert all(got[f"err_{name}"] >= got["err_a_rise"] > 1e-12 for name in names)
+
+
+@pytest.mark.parametrize("speeds", [100.0, "100 rpm", True, None])
+def test_speeds_of_a_sew_that_are_no_list_are_refused_by_name(speeds):
+    """A single number ended in a TypeError that named neither relation nor key."""
+    relations = {"a": {"take": ["thin", "blade"], "fields": {"slow": (0.0, 50.0)}}}
+    with pytest.raises(InputError, match=r"relations\.sews: speeds = .*, growing, at least two"):
+        hand_made.machine_of(relations | {"sews": {"sew": ["a"], "speeds": speeds}})
