@@ -10,7 +10,7 @@ import numpy as np
 
 from kernels import status as codes
 from sweep.dataset import files
-from sweep.errors import grouped, how_many
+from sweep.errors import how_many
 from sweep.evaluation.statuses import meaning
 from sweep.optimise.local.descent import KKT
 from sweep.optimise.local.start import DIFFERS
@@ -243,7 +243,7 @@ def search_sentence(data: Dataset, scanned: Scan) -> str:
 
 def _count(n: float) -> str:
     """Format a count as 1 234 567 with thin no-break spaces."""
-    return grouped(n).replace(" ", "\u202f")
+    return f"{int(n):,}".replace(",", "\u202f")
 
 
 def proof_sentence(data: Dataset) -> str:
