@@ -12,9 +12,11 @@ from typing import Any
 
 from sweep.errors import InputError, choices
 from sweep.families.base import Family, Output
-from sweep.families.names import is_flag
+from sweep.families.names import by_magnitude, is_flag
 from sweep.quantities import units
-from sweep.quantities.limits import Limit
+from sweep.quantities.kinds import Margin, Reduced
+from sweep.quantities.limits import Limit, tightest
+from sweep.quantities.resolve import find
 from sweep.quantities.resolve import output as design_output
 from sweep.study.file import Faults, Key, Number, Section, StudyFile, TwoTexts, holds, read_section
 from sweep.study.locus import prescribed_limits
@@ -153,10 +155,25 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
         else:
             faults.value(key, entry, _form(output))
         counts = "tolerance" in file and all(_around(held.get(name), band) for band in limits[before:])
+        if name not in prescribed and tightest(limits[before:], name)[1] < 0.0 and _never_negative(family, name):
+            at, written = ((*key, "max"), entry["max"]) if isinstance(entry, dict) else (key, entry)
+            faults.value(at, written, f"a bound of 0 or more: {name} is never negative where limits compare it")
+            del limits[before:]  # the optimiser's objection to the same bound would be a second fault
         if name in prescribed and not counts:
             allowed = "nothing here: [locus] prescribes it; with [tolerance] a band around that, as"
             faults.value(key, entry, f"{allowed} {_band(units.internal_unit(output.unit))}")
     return tuple(limits)
+
+
+def _never_negative(family: Family, name: str) -> bool:
+    """Tell whether no design keeps an upper bound below 0: of an extreme angle of a force, a magnitude, a range."""
+    match find(family, name):
+        case Margin(kind=kind):
+            return kind.endswith("_angle")
+        case Reduced(reduction=reduction):
+            return reduction.name in ("max_abs", "range", "rms") and not reduction.place
+        case _:
+            return by_magnitude(name)
 
 
 def _around(held: Limit | None, band: Limit) -> bool:

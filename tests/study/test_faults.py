@@ -174,6 +174,26 @@ FAULTS = {
     "limit without unit": ('max = 45, unit = "deg"', "max = 45", ["limits.max_pressure_angle.unit is missing", "deg"]),
     "limit in a wrong unit": ('max = 45, unit = "deg"', 'max = 45, unit = "mm"', ["max_pressure_angle.unit = 'mm'"]),
     "limit with a misspelt bound": ("{ min = 0.1 }", "{ mni = 0.1 }", ["limits.margin.mni", "did you mean 'min'?"]),
+    "limit below every pressure angle": (
+        "{ max = 45,",
+        "{ max = -5,",
+        ["limits.max_pressure_angle.max = -5;", "a bound of 0 or more: max_pressure_angle is never negative"],
+    ),
+    "limit below every magnitude": (
+        "margin = { min = 0.1 }",
+        'max_abs_psi = "<= -10 deg"',
+        ["limits.max_abs_psi = '<= -10 deg'", "0 or more"],
+    ),
+    "band below every range": (
+        "margin = { min = 0.1 }",
+        'range_dpsi = "-2 +- 1"',
+        ["limits.range_dpsi = '-2 +- 1'", "0 or more"],
+    ),
+    "limit below every swing, whose magnitude counts": (
+        "margin = { min = 0.1 }",
+        'swing = { max = -40, unit = "deg" }',
+        ["limits.swing.max = -40;", "0 or more"],
+    ),
     "rotatable false": ("rotatable = true", "rotatable = false", ["limits.rotatable = false", "true"]),
     "objective unknown": ('"max_abs_d2psi"', '"max_abs_d2ps"', ["objective.minimise", "'max_abs_d2psi'?"]),
     "objective missing": ('[objective]\nminimise = "max_abs_d2psi"', "", ["objective is missing", "[optimise]"]),
