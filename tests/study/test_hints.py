@@ -112,6 +112,18 @@ def test_a_message_leads_to_what_is_meant(before: str, behind: str, said: str, t
     assert said in str(fault.value)
 
 
+@pytest.mark.parametrize("chain", [["rssr", "guidee"], ["rsr"], ["rssr", "four_barr", "guide"]])
+def test_a_misspelt_family_whose_closest_match_does_not_fit_is_one_fault(chain: list[str], tmp_path: Path) -> None:
+    """The match has other parameters than the tables: each of them was told as a fault, and none was one."""
+    text = CRANK_ROCKER.replace('family = "rssr"', f"chain = {chain}") + 'm_slide = "20 g"\n[objectiv]\n'
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(StudyError) as caught:
+        load_study(tmp_path)
+    (index,) = (k for k, name in enumerate(chain) if name not in NAMES)
+    told = [fault.split()[1] for fault in caught.value.faults]
+    assert told == ["objectiv:", f"mechanism.chain[{index}]"]
+
+
 def test_the_name_of_an_effect_leads_to_the_one_of_the_family(tmp_path: Path) -> None:
     text = CRANK_ROCKER.replace('"rssr"', '"rssp"').replace('"kinetostatics"', '"friction"')
     (tmp_path / "study.toml").write_text(text, encoding="utf-8")

@@ -89,3 +89,29 @@ def test_bound_that_the_optimiser_cannot_follow_is_told_with_its_line(tmp_path, 
     study = study_of(tmp_path, text.replace("[optimise]\nstarts = 1\n", ""))
     with pytest.raises(InputError, match=allowed):
         Program(Problem(study.family, ("a",), [8.0], [12.0], {}, "max_abs_d2psi", study.limits))
+
+
+@pytest.mark.parametrize(
+    ("limit", "place", "value"),
+    [
+        ("max_pressure_angle = { max = -5, unit = 'deg' }", "max_pressure_angle.max", "-5"),
+        ("max_abs_psi = '<= -10 deg'", "max_abs_psi", "'<= -10 deg'"),
+        ("range_dpsi = '-2 +- 1'", "range_dpsi", "'-2 +- 1'"),
+        ("rms_dpsi = { min = -1, max = -0.5 }", "rms_dpsi.max", "-0.5"),
+        ("swing = { max = -40, unit = 'deg' }", "swing.max", "-40"),
+    ],
+)
+@pytest.mark.parametrize("optimise", ["[optimise]\nstarts = 1\n", ""])
+def test_upper_bound_below_zero_of_what_is_never_negative_is_one_fault(tmp_path, limit, place, value, optimise) -> None:
+    """A study with such a bound passed the check and swept its space for nothing; of a swing the magnitude counts."""
+    text = STUDY.replace('swing = ">= 20 deg"', limit).replace("[optimise]\nstarts = 1\n", optimise)
+    with pytest.raises(StudyError) as caught:
+        study_of(tmp_path, text)
+    (fault,) = caught.value.faults
+    assert f"study.toml:17: limits.{place} = {value}; allowed: a bound of 0 or more" in fault
+
+
+@pytest.mark.parametrize("limit", ["max_psi = '<= -10 deg'", "min_dpsi = '<= -1'", "margin = '<= -0.1'"])
+def test_upper_bound_below_zero_of_what_may_be_negative_is_kept(tmp_path, limit) -> None:
+    (kept,) = study_of(tmp_path, STUDY.replace('swing = ">= 20 deg"', limit)).limits
+    assert kept.maximum is not None and kept.maximum < 0.0
