@@ -114,13 +114,14 @@ def plain_names(table: Iterable[Any]) -> tuple[str, ...]:
     return tuple(match[1] if (match := _HEADER.fullmatch(str(key))) else str(key) for key in table)
 
 
-def grid_in_radians(name: str, unit: str, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
+def grid_in_radians(domain: Domain, phi: ArrayLike, angles: AngleUnit | None) -> ArrayLike:
     """Convert the argument ``phi=`` to rad if the variable is an angle; otherwise it is returned as it is."""
     _check_unit(angles)
-    converted: ArrayLike = plain(phi, internal_unit(unit), name)
+    name = domain.name
+    converted: ArrayLike = plain(phi, internal_unit(domain.unit), name)
     if converted is not phi:
         return np.asarray(converted, np.float64)
-    if unit != "rad":
+    if domain.unit != "rad":
         return phi
     if angles == "deg":
         return np.asarray(numbers(phi, name, f"{name}, position")) * RADIANS

@@ -143,14 +143,10 @@ def _feet(family: Family, designs: Array) -> Iterator[tuple[str, Columns, Array,
     for presser in family.every(PresserFoot):
         columns, path, _, _ = presser.march(designs, presser.nodes)
         yield "", columns, path[0], 0.0
-    for foot in _pressings(family):
+    for foot in family.every(Pressing):
         assert isinstance(family, Machine)
         columns, path, ahead = foot.marched(family, designs, foot.foot.nodes)
         yield foot.name, columns, path[0], float(ahead[0])
-
-
-def _pressings(family: Family) -> list[Pressing]:
-    return [r for r in getattr(family, "relations", ()) if isinstance(r, Pressing)]
 
 
 def _foot_rows(member: str, columns: Columns, path: Array, ahead: float) -> Iterator[CyclogramRow]:
@@ -188,7 +184,7 @@ def event_angles(family: Family) -> dict[str, str]:
     names |= {r.name: f"phi_{r.name}" for r in relations if isinstance(r, Moment)}
     if family.find(PresserFoot) is not None:
         names |= {end: f"phi_{end}" for end in FLIGHT_ENDS}
-    feet = [f"{foot.name}_{end}" for foot in _pressings(family) for end in FLIGHT_ENDS]
+    feet = [f"{foot.name}_{end}" for foot in family.every(Pressing) for end in FLIGHT_ENDS]
     return names | {name: f"phi_{name}" for name in feet}
 
 

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from kernels.status import OK
 from sweep.errors import InputError
 from sweep.evaluation.angles import AngleUnit, grid_in_radians, in_radians
-from sweep.evaluation.poses import check_march
-from sweep.evaluation.tables import Table, numbers, one_design
+from sweep.evaluation.poses import values_of_the_variable
+from sweep.evaluation.tables import Table, one_design
 from sweep.families import Mechanism
 from sweep.families import family as find_family
 from sweep.families.base import Angles, Array, Family
@@ -136,7 +136,7 @@ def joints(mechanism: Mechanism, design: Table, phi: ArrayLike, *, angles: Angle
         name: [] for name in ("member", "stage", "frame", "joint", "kind", "phi", "x", "y", "z", "status")
     }
     family = find_family(mechanism)
-    phi = grid_in_radians(family.domain.name, family.domain.unit, phi, angles)
+    phi = grid_in_radians(family.domain, phi, angles)
     for part in parts(mechanism, in_radians(family, design, angles), phi):
         m = part.phi.size
         for name, path in part.joints.items():
@@ -156,10 +156,7 @@ def parts(mechanism: Mechanism, design: Table, phi: ArrayLike) -> list[Part]:
     """List the stages of a mechanism with their joints, by member and stage; arguments as of `joints`."""
     family = find_family(mechanism).precise()
     matrix = one_design(family, design)
-    angles = np.atleast_1d(numbers(phi, "phi", "phi, position"))
-    if angles.ndim != 1 or not np.isfinite(angles).all():
-        raise InputError("phi", phi, "finite angles [rad], one or a plain list", "phi")
-    check_march(family.domain, angles)
+    angles = values_of_the_variable(family.domain, phi)
     given = Angles.of(np.ascontiguousarray(angles[None, :]))
     if isinstance(family, Machine):
         return [part for member in family.members for part in _of_member(family, member, matrix, given)]

@@ -13,7 +13,7 @@ from kernels.types import TWO_PI, Array
 from sweep.effects import inputs_beside
 from sweep.errors import InputError, MissingInput, listed, nearest
 from sweep.evaluation.angles import TURNING, grid_in_radians, is_plausible
-from sweep.evaluation.poses import check_march, query_of, values_of_the_variable
+from sweep.evaluation.poses import query_of, values_of_the_variable
 from sweep.evaluation.routes import design_outputs
 from sweep.evaluation.statuses import explained
 from sweep.evaluation.summaries import chosen_accuracy
@@ -214,9 +214,7 @@ def _angles(domain: Domain, phi: ArrayLike) -> tuple[Angles, bool]:
 
 
 def _checked(domain: Domain, phi: ArrayLike) -> Angles:
-    grid = values_of_the_variable(grid_in_radians(domain.name, domain.unit, phi, None))
-    check_march(domain, grid)
-    return Angles.of(grid[None, :])
+    return Angles.of(values_of_the_variable(domain, grid_in_radians(domain, phi, None))[None, :])
 
 
 @lru_cache(maxsize=32)

@@ -87,7 +87,7 @@ def evaluate(
     table = plain_columns(table)
     others = inputs_beside(bare, plain_names(table))
     table = in_radians(mechanism, table, angles, others, mechanism.domain)
-    phi = None if phi is None else grid_in_radians(mechanism.domain.name, mechanism.domain.unit, phi, angles)
+    phi = None if phi is None else grid_in_radians(mechanism.domain, phi, angles)
     variable = mechanism.domain.name
     extra = () if phi is not None else (variable,)
     matrix, extras = design_matrix(mechanism, table, extra, unused=others)
@@ -96,7 +96,10 @@ def evaluate(
         _check_column(mechanism, extras)
         at, head, repeats = extras[variable][:, None], {}, 1
     else:
-        grid = _grid(mechanism, table, phi)
+        if variable in map(str, table):
+            allowed = f"either phi= for every design, or a column {variable}, not both"
+            raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
+        grid = values_of_the_variable(mechanism.domain, phi)
         at, repeats = grid[None, :], grid.size
         head = {"design": np.repeat(np.arange(len(matrix)), repeats), variable: np.tile(grid, len(matrix))}
         index = None if index is None else index.repeat(repeats)
@@ -140,8 +143,8 @@ def query_of(family: Family, want: str | Sequence[str], loads: Loads | None, kin
     return query
 
 
-def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
-    """Return the argument ``phi=`` as a 1-D array of finite values."""
+def values_of_the_variable(domain: Domain, phi: ArrayLike) -> NDArray[np.float64]:
+    """Return the argument ``phi=`` as a 1-D array of finite values, those of a march equal steps of one turn from 0."""
     grid = numbers(phi, "phi", "phi, position")
     if grid.ndim > 1:
         raise InputError("phi", f"shape {grid.shape}", "one angle, or a plain list of angles for every design", "phi")
@@ -149,7 +152,21 @@ def values_of_the_variable(phi: ArrayLike) -> NDArray[np.float64]:
     if not np.isfinite(grid).all():
         position = int(np.argmin(np.isfinite(grid)))
         raise InputError("phi", float(grid[position]), "a finite number", f"phi, position {position}")
+    if isinstance(domain, March):
+        _check_steps(grid)
     return grid
+
+
+def _check_steps(grid: NDArray[np.float64]) -> None:
+    """Raise if crank angles are not equal steps of one turn from 0, in order."""
+    if not grid.size:
+        raise InputError("phi", "no angle", "equal steps of one turn from 0: a pose depends on those before it", "phi")
+    steps = np.arange(grid.size) * (TWO_PI / grid.size)
+    off = np.abs(grid - steps) > 1e-12 * TWO_PI
+    if off.any():
+        k = int(np.argmax(off))
+        allowed = f"equal steps of one turn from 0, here {steps[k]:.6g}: a pose depends on those before it"
+        raise InputError("phi", float(grid[k]), allowed, f"phi, position {k}")
 
 
 def _check_column(mechanism: Family, extras: Container[str]) -> None:
@@ -161,31 +178,6 @@ def _check_column(mechanism: Family, extras: Container[str]) -> None:
     if variable not in extras:
         allowed = f"a column {variable}, or the argument phi="
         raise MissingInput(variable, allowed, f"table of {mechanism.name}")
-
-
-def _grid(mechanism: Family, table: Table, phi: ArrayLike) -> NDArray[np.float64]:
-    """Return the argument ``phi=``, checked against the table and the domain."""
-    variable = mechanism.domain.name
-    if variable in map(str, table):
-        allowed = f"either phi= for every design, or a column {variable}, not both"
-        raise InputError(variable, "a column", allowed, f"table of {mechanism.name}")
-    grid = values_of_the_variable(phi)
-    check_march(mechanism.domain, grid)
-    return grid
-
-
-def check_march(domain: Domain, grid: NDArray[np.float64]) -> None:
-    """Raise if the domain is a march and the crank angles are not equal steps of one turn from 0."""
-    if not isinstance(domain, March):
-        return
-    if not grid.size:
-        raise InputError("phi", "no angle", "equal steps of one turn from 0: a pose depends on those before it", "phi")
-    steps = np.arange(grid.size) * (TWO_PI / grid.size)
-    off = np.abs(grid - steps) > 1e-12 * TWO_PI
-    if off.any():
-        k = int(np.argmax(off))
-        allowed = f"equal steps of one turn from 0, here {steps[k]:.6g}: a pose depends on those before it"
-        raise InputError("phi", float(grid[k]), allowed, f"phi, position {k}")
 
 
 def pose_wants(mechanism: Family, want: str | Sequence[str]) -> list[str]:

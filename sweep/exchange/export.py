@@ -164,7 +164,7 @@ def export(
         raise InputError("speed", speed, "a positive number of rad/s", "export")
     family = find_family(mechanism)
     design = in_radians(family, design, angles)
-    phi = finite(float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles))))
+    phi = finite(float(np.asarray(grid_in_radians(family.domain, phi, angles))))
     write = _writer(kind, mechanism, design, phi, poses, unit, speed)
     with replacing(target) as partial:
         write(partial)

@@ -250,7 +250,7 @@ def mechanism(
         raise InputError("view", view, f"space, {', '.join(VIEWS)}", "plot")
     family = find_family(mechanism)
     design = in_radians(family, design, angles)
-    start = float(np.asarray(grid_in_radians(family.domain.name, family.domain.unit, phi, angles), np.float64))
+    start = float(np.asarray(grid_in_radians(family.domain, phi, angles), np.float64))
     stages = over(mechanism, design, start, 180)
     if not exists(stages):
         raise InputError("design", dict(stages[0].parameters), "one with a pose in which all its joints exist", "plot")

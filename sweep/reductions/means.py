@@ -24,7 +24,7 @@ from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
 from sweep.reductions.resolution import denser, ends, nearest, series_of
 from sweep.reductions.rounding import ALONE, shaken, shaken_anywhere
-from sweep.reductions.sampling import DESIGN_STATUS, blocks, pose_columns, sample_turn
+from sweep.reductions.sampling import DESIGN_STATUS, blocks, continued, pose_columns, sample_turn
 
 SAMPLES = 128  # first number of samples of a turn
 HIGHEST = 9  # number of the highest orders that samples show, the largest of which bounds the error of their mean
@@ -149,11 +149,11 @@ def _on_turn(family: Family, designs: Array, pose: str) -> tuple[Array, Array, S
 def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: float) -> tuple[Array, Array, Status]:
     """Compute means, errors and status by adaptive quadrature of precise poses: others may be dominated by rounding."""
     family, n = family.precise(), len(designs)
-    status, wraps = np.zeros(n, np.uint8), family.pose_output[pose].wraps
+    status = np.zeros(n, np.uint8)
     columns, codes = pose_columns(family, designs, edges, [pose])
     scan.worst_status(codes, status)
     starts = columns[pose]
-    if wraps:
+    if family.pose_output[pose].wraps:
         scan.unwrap(starts, np.empty(n, np.int64))
     size = np.abs(starts).max(axis=1)
     size = np.where((size > 0.0) & np.isfinite(size), size, 1.0)
@@ -165,9 +165,7 @@ def _on_panels(family: Family, designs: Array, pose: str, edges: Array, target: 
         scan.worst_status(codes, worst)
         bad = worst != st.OK
         status[rows[bad]] = worst[bad]
-        values = columns[pose]
-        if wraps:
-            values = values + TWO_PI * np.rint((starts[rows, origins][:, None] - values) / TWO_PI)
+        values = continued(family, pose, columns[pose], starts[rows, origins][:, None])
         out: Array = np.square(values / size[rows, None])
         out[bad] = np.nan
         return out[:, :, None]

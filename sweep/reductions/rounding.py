@@ -11,6 +11,7 @@ from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI
 from sweep.families.base import Accuracy, Array, Columns, Family, Step
 from sweep.families.capabilities import Assembly
+from sweep.numerics.events import beyond
 from sweep.numerics.records import Indices, Mask, only
 from sweep.numerics.singularities import Singularities, crowded
 from sweep.reductions.refine import Peaks, confirmed, first_peaks, polish_places
@@ -118,9 +119,7 @@ def shaken(family: Family, designs: Array, phi: Array, name: str) -> Array:
     angles = np.atleast_2d(phi.T).T
     columns, status = pose_columns(family, every, np.tile(angles, (TRIES + 1, 1)), [name])
     values, known = (x.reshape(TRIES + 1, *angles.shape) for x in (columns[name], status == st.OK))
-    off = values[1:] - values[0]
-    if family.pose_output[name].wraps:
-        off -= TWO_PI * np.rint(off / TWO_PI)
+    off = beyond(values[1:], values[0], family.pose_output[name].wraps)
     found: Array = np.where(known[1:], np.abs(off), 0.0).max(axis=(0, 2))
     return found
 

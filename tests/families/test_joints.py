@@ -241,7 +241,7 @@ def test_several_designs_and_bad_angles_are_refused():
     design = example("four_bar")
     with pytest.raises(sweep.InputError, match="one design"):
         sweep.joints("four_bar", design | {"a": [1.0, 1.1]}, 0.0)
-    with pytest.raises(sweep.InputError, match="finite angles"):
+    with pytest.raises(sweep.InputError, match="a finite number"):
         sweep.joints("four_bar", design, [math.nan])
 
 

@@ -63,7 +63,7 @@ def diagram(
     3  4.71         95.23
     """
     family = find_family(mechanism)
-    threads = [r for r in getattr(family, "relations", ()) if isinstance(r, ThreadBalance)]
+    threads = family.every(ThreadBalance)
     if not threads:
         raise InputError("mechanism", family.name, "a machine with threads", "thread diagram")
     if not isinstance(samples, int | np.integer) or samples < 1:

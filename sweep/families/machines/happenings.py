@@ -28,7 +28,7 @@ Happening = Event | Moment
 def happenings(machine: Machine) -> dict[str, Happening]:
     """Return the events and moments at which paths of threads change, by name."""
     every = _every(machine)
-    threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    threads = machine.every(ThreadBalance)
     return {name: every[name] for thread in threads for name in thread.happens if name in every}
 
 
@@ -41,7 +41,7 @@ def check_happenings(machine: Machine) -> None:
         with the thread and the nearest right name.
     """
     every = _every(machine)
-    threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    threads = machine.every(ThreadBalance)
     changing = {output.name for thread in threads if thread.happens for output in thread.outputs}
     for thread in threads:
         place = f"machine.relations.{thread.name}"
@@ -88,7 +88,7 @@ def event_angles(machine: Machine, designs: Array) -> tuple[dict[str, Any], NDAr
 
 def bends_of_threads(machine: Machine) -> list[Bends]:
     """List the bends of tensions and rates of threads between events."""
-    threads = [r for r in machine.relations if isinstance(r, ThreadBalance) and r.bent]
+    threads = [r for r in machine.every(ThreadBalance) if r.bent]
     return [Bends(frozenset(f"{r.name}_{name}" for name in r.bent), partial(_bending, machine, r)) for r in threads]
 
 
@@ -105,7 +105,7 @@ def _bending(machine: Machine, thread: ThreadBalance, designs: Array, angles: An
 
 def switches_of_threads(machine: Machine) -> list[Switches]:
     """List the switches of threads' curves: events, and points of the table of the allowed excess."""
-    threads = [r for r in machine.relations if isinstance(r, ThreadBalance)]
+    threads = machine.every(ThreadBalance)
     tables = [of_table(r.allowed.phi, frozenset({f"{r.name}_excess"})) for r in threads if r.allowed]
     of = frozenset(output.name for thread in threads for output in thread.outputs)
     return [*tables, Switches(partial(_switches, machine), of)] if happenings(machine) else tables

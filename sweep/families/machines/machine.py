@@ -12,7 +12,7 @@ import numpy as np
 from kernels.chains.links import chain_rule
 from kernels.status import OK
 from kernels.types import Array
-from sweep.families.base import PER_RADIAN, Angles, Columns, Event, Family, Output, Parameter
+from sweep.families.base import PER_RADIAN, Angles, Capability, Columns, Event, Family, Output, Parameter
 from sweep.families.capabilities import Assembly
 from sweep.families.chain import loop_of_part, magnitude
 from sweep.families.curve_features import of_members
@@ -54,6 +54,10 @@ class Machine(Family):
         while member.driver is not None:
             member = self.member(member.driver[0])
         return abs(member.ratio)
+
+    def every(self, kind: type[Capability]) -> tuple[Capability, ...]:
+        """All capabilities and relations of a type."""
+        return (*super().every(kind), *(r for r in self.relations if isinstance(r, kind)))
 
     def split(self, name: str) -> tuple[Member, str] | None:
         """Split a dotted name into member and own name; None for a name of the machine itself."""
