@@ -161,12 +161,7 @@ def _group(model: GltfModel, part: Part, times: int, size: float) -> int:
     for joint, axis in part.axes.items():
         reach = 0.12 * size
         at = part.joints[joint][0] - reach * axis
-        children.append(
-            model.node(
-                name=f"axis_{shown_name(joint)}", mesh=model.mesh("bar", "frame"), translation=at.tolist(),
-                rotation=_shortest(Z, axis).as_quat().tolist(), scale=[0.4 * thick, 0.4 * thick, 2.0 * reach],
-            )
-        )  # fmt: skip
+        children.append(_rod(model, f"axis_{shown_name(joint)}", "frame", at, axis, 0.4 * thick, 2.0 * reach))
     name = part.label if part.member or part.stage else "stage"
     return model.node(name=name, translation=part.shift.tolist(), children=children)
 
@@ -176,12 +171,17 @@ def _block(model: GltfModel, part: Part, link: Link, colour: str, times: int, th
     slides = [part.axes[name] for name, kind in part.kinds.items() if kind == "slide"]
     axis, reach = slides[0] if slides else Z, 4.0 * thick
     path = part.joints[link.joints[0]] - reach * axis
-    node = model.node(
-        name=f"{link.name} block", mesh=model.mesh("bar", colour), translation=path[0].tolist(),
-        rotation=_shortest(Z, axis).as_quat().tolist(), scale=[2.2 * thick, 2.2 * thick, 2.0 * reach],
-    )  # fmt: skip
+    node = _rod(model, f"{link.name} block", colour, path[0], axis, 2.2 * thick, 2.0 * reach)
     model.animate(node, times, "translation", path)
     return node
+
+
+def _rod(model: GltfModel, name: str, colour: str, at: Array, axis: Array, radius: float, length: float) -> int:
+    """Return a bar from a point along an axis."""
+    return model.node(
+        name=name, mesh=model.mesh("bar", colour), translation=at.tolist(),
+        rotation=_shortest(Z, axis).as_quat().tolist(), scale=[radius, radius, length],
+    )  # fmt: skip
 
 
 def _bar(model: GltfModel, name: str, colour: str, start: Array, end: Array, times: int, thick: float) -> int:

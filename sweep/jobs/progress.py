@@ -138,10 +138,10 @@ class Progress:
             else:
                 self._line_if_due()
 
-    def expect(self, total: int, unit: str | None = None) -> None:
+    def expect(self, total: int, unit: str) -> None:
         """Update the total, as known by now, and the unit that is counted."""
         with self._listener():
-            self.total, self.unit = total, self.unit if unit is None else unit
+            self.total, self.unit = total, unit
             if self.bar is not None:
                 self.bar.total, self.bar.unit, self.bar.unit_scale = total or None, f" {self.unit}", total >= SCALED
                 self.bar.bar_format = self._form()

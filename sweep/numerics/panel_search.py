@@ -15,7 +15,7 @@ from numpy.polynomial import chebyshev
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Array
 from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
-from sweep.numerics.records import Indices, only
+from sweep.numerics.records import Indices, joined, only
 
 PANELS = 64  # first even panels of a turn, besides cuts where a curve may bend
 TAIL = 4  # last coefficients that bound a polynomial's error; for a tent in the middle three of them nearly vanish ...
@@ -186,7 +186,7 @@ def _highest(tops: list[Top], n: int, tie: Array) -> Top:
 
     Of maxima that differ by less than ``tie`` (n,) the first of the turn gives the place.
     """
-    every = Top(*(np.concatenate(parts) for parts in zip(*tops, strict=True)))
+    every = joined(*tops)
     order = np.lexsort((every.phi, -every.value, every.row))
     row, first = np.unique(every.row[order], return_index=True)
     highest, ceiling = only(every, order[first]), np.full(n, -np.inf)

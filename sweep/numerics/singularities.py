@@ -40,16 +40,15 @@ class Singularities(NamedTuple):
         return nearest.reshape(phi.shape)
 
 
-def singularities(discriminants: Sequence[Discriminant], n: int, within: float = FAR) -> Singularities:
+def singularities(discriminants: Sequence[Discriminant], n: int) -> Singularities:
     """Find the nearest complex zeros of the discriminants of n designs from their dips over the turn.
 
     A dip D + D''/2 x^2 vanishes at x = +- i rho with rho^2 = D/(D''/2).  The parabola through three samples is repeated
-    with smaller steps about the dip, unless the first one puts the zero farther away than ``within`` [rad]: for such
-    zeros the samples are accurate enough.  Where a discriminant is nan there is no pose, and a zero is placed there.
+    with smaller steps about the dip.  Where a discriminant is nan there is no pose, and a zero is placed there.
     """
     if not discriminants:
         return Singularities(np.ones((n, 1)), np.full((n, 1), FAR))
-    return side_by_side([dips(curve, n, number, within) for number, curve in enumerate(discriminants)])
+    return side_by_side([dips(curve, n, number, FAR) for number, curve in enumerate(discriminants)])
 
 
 def side_by_side(found: Sequence[Singularities]) -> Singularities:
@@ -58,7 +57,10 @@ def side_by_side(found: Sequence[Singularities]) -> Singularities:
 
 
 def dips(curve: Discriminant, n: int, number: int, within: float) -> Singularities:
-    """Find the nearest zeros of one discriminant, the ``number``-th of its kind, as `singularities` does."""
+    """Find the nearest zeros of one discriminant, the ``number``-th of its kind, as `singularities` does.
+
+    Where the first parabola puts a zero farther away than ``within`` [rad] the samples are accurate enough.
+    """
     spacing = TWO_PI / SAMPLES
     turn = np.arange(SAMPLES, dtype=np.float64) * spacing
     # One row of angles for all designs: their cosines and sines are computed once.

@@ -142,8 +142,7 @@ class PeakSearch:
             sign = np.sign(values[row, column]) if request.mode == 0 else np.full(count, float(request.mode))
             pieces.append(PeakCandidates(np.full(count, number), row, column, sign))
             needed[number, rough > ROUGH] = 2 * samples
-        joined = [np.concatenate(parts) for parts in zip(*pieces, strict=True)]
-        return PeakCandidates(*joined), scales, needed, alone
+        return joined(*pieces), scales, needed, alone
 
     def _samples_by_singularity(self, columns: dict[str, Array], samples: int, count: int) -> Indices:
         distance = np.full(count, np.inf)

@@ -20,7 +20,7 @@ from sweep.families import curve_features as features
 from sweep.families.base import Angles, Array, Family
 from sweep.families.curve_features import Bends, SingularCurve
 from sweep.numerics.events import near_zeros, sign_changes, with_events
-from sweep.numerics.records import Indices, Mask, only, put
+from sweep.numerics.records import Indices, Mask, joined, only, put
 from sweep.numerics.singularities import (
     FAR,
     SAMPLES,
@@ -85,7 +85,7 @@ def nearest(family: Family, designs: Array, outputs: Collection[str], within: fl
 
     every = [designs[some] for some in blocks(np.arange(len(designs)), SAMPLES, len(curves))]
     parts = [side_by_side([of_curve(*one, some) for one in enumerate(curves)]) for some in every]
-    return Singularities(*(np.concatenate(found) for found in zip(*parts, strict=True)))
+    return joined(*parts)
 
 
 def broken(family: Family, designs: Array, near: Singularities, status: Status) -> None:

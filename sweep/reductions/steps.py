@@ -252,7 +252,7 @@ def group_ns(
 
     ``jumps`` are pose outputs that jump in these designs, which are searched on panels like those with kinks.
     """
-    stages, pose = _stages(family), pose_ns(family)
+    stages, pose = len(_stages(family)), pose_ns(family)
     if group == "margin":
         return sum(_margin_ns(family, suffix, accuracy) for suffix in margin_suffixes(family))
     asked = [resolve(family, name) for name in names]
@@ -266,7 +266,7 @@ def group_ns(
         return (accuracy.samples or POSES_MEAN) * (pose + nanoseconds("work", "scan") * scans + effects)
     assert accuracy.target is not None
     quick = {r for r in requested if not r.windowed and curve_of(family, r, False) is not None}
-    fused = _stages(family) * nanoseconds("work", "fused extremum") * len(quick)
+    fused = stages * nanoseconds("work", "fused extremum") * len(quick)
     fused += POSES_PLACE * pose * sum(request.place for request in quick)
     # The ends of a window are found as events are.
     cuts = sum(r.windowed for r in requested) + sum(isinstance(one, WindowAngle) for one in asked)
@@ -297,17 +297,15 @@ def _margin_ns(family: Family, suffix: str, accuracy: Accuracy) -> float:
     return step_ns(stage.family, step, accuracy)
 
 
-def _stages(family: Family) -> int:
-    if isinstance(family, Machine):
-        return sum(_stages(member.family) for member in family.members)
-    return len(family.stages)
+def _stages(family: Family) -> list[Family]:
+    """List the families of the stages of a chain, or of all members of a machine."""
+    mechanisms = [member.family for member in family.members] if isinstance(family, Machine) else [family]
+    return [stage.family for mechanism in mechanisms for stage in mechanism.stages]
 
 
 def pose_ns(family: Family) -> float:
     """Estimate the time of a pose's motion [ns]: of a chain or a machine the sum over stages and members."""
-    if isinstance(family, Machine):
-        return sum(pose_ns(member.family) for member in family.members)
-    return sum(nanoseconds("poses", stage.family.name) for stage in family.stages)
+    return sum(nanoseconds("poses", stage.name) for stage in _stages(family))
 
 
 def group_order(family: Family, group: GeneralRoute, names: Sequence[str]) -> tuple[Work, int]:

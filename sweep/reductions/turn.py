@@ -79,16 +79,17 @@ def limits_and_reductions(
     wanted = list(dict.fromkeys(r for one in others.values() for r in requests(family, one, windowed)))
     status = np.zeros(len(designs), np.uint8)
     found: Extrema = {}
+
+    def search(some: Sequence[Request], window: Window | None = None) -> None:
+        more, now = _extrema(family, designs, [r for r in some if r not in found], accuracy, window)
+        found.update(more)
+        np.copyto(status, now, where=status == st.OK)
+
     for position in dict.fromkeys(family.follower(r.pose) for r in wanted if r.windowed):
-        ends = [Request(position, 1), Request(position, -1)]
-        more, now = _extrema(family, designs, [r for r in ends if r not in found], accuracy, None)
-        found, status = found | more, np.where(status == st.OK, now, status)
+        search([Request(position, 1), Request(position, -1)])
         inside = [r for r in wanted if r.windowed and family.follower(r.pose) == position]
-        more, now = _extrema(family, designs, inside, accuracy, _window(position, found, accuracy, part))
-        found, status = found | more, np.where(status == st.OK, now, status)
-    more, now = _extrema(family, designs, [r for r in wanted if r not in found], accuracy, None)
-    found |= more
-    status = np.where(status == st.OK, now, status)
+        search(inside, _window(position, found, accuracy, part))
+    search(wanted)
     columns: Columns = {}
     for name, one in others.items():
         columns[name], columns[f"err_{name}"] = _value(family, designs, one, found, windowed)
@@ -98,10 +99,10 @@ def limits_and_reductions(
         stroke, now = _extrema(family, designs, requests(family, stay, windowed), finer, None)
         angle, err = window_angle(family, designs, _window(stay.of, stroke, finer, part))
         if accuracy.target is not None:  # ends that miss their finer target may be good enough for the angle
-            now = np.where((now == st.NOT_CONVERGED) & (err <= accuracy.target), st.OK, now)
-        status = np.where(status == st.OK, now, status)
+            now[(now == st.NOT_CONVERGED) & (err <= accuracy.target)] = st.OK
+        np.copyto(status, now, where=status == st.OK)
         columns[name], columns[f"err_{name}"] = angle, err
-    return columns | {"status": status.astype(np.uint8)}
+    return columns | {"status": status}
 
 
 def _window(position: str, found: Extrema, accuracy: Accuracy, part: tuple[float, float] | None) -> Window:
