@@ -55,7 +55,8 @@ def over(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pa
     family = find_family(mechanism)
     if isinstance(family.domain, March):
         steps = equal_steps(family.domain, np.empty((0, 0)), poses)
-        return [_closed(part) for part in parts(mechanism, design, steps)]
+        closed, angles = [*range(poses), 0], np.append(steps, 2.0 * math.pi)
+        return [_taken(part, closed, angles) for part in parts(mechanism, design, steps)]
     if isinstance(family.domain, Interval):
         matrix, _ = design_matrix(family, design)
         return parts(mechanism, design, _there_and_back(equal_steps(family.domain, matrix, 2), phi, poses))
@@ -70,12 +71,8 @@ def _there_and_back(ends: Array, start: float, poses: int) -> Array:
     return angles
 
 
-def _closed(part: Part) -> Part:
-    """Return the part with its first pose repeated at the end."""
-    return _taken(part, [*range(part.phi.size), 0], np.append(part.phi, 2.0 * math.pi))
-
-
 def _taken(part: Part, rows: list[int], phi: Array) -> Part:
+    """Return a part in some of its poses, at the angles ``phi``."""
     joints = {name: path[rows] for name, path in part.joints.items()}
     crank, position, status = part.crank[rows], part.position[rows], part.status[rows]
     return replace(part, phi=phi, joints=joints, crank=crank, position=position, status=status)

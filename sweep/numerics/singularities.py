@@ -73,7 +73,8 @@ def dips(curve: Discriminant, n: int, number: int, within: float) -> Singulariti
     row, which = np.nonzero(np.take_along_axis(dip, column, axis=1))
     phi = turn[column[row, which]]
     rho = np.minimum(spacing * np.sqrt(np.maximum(nearness[row, column[row, which]], 0.0)), FAR)
-    places, distances = _elsewhere(n, number)
+    # Missing dips are far away, each at another angle.
+    places, distances = np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1)), np.full((n, NEAREST), FAR)
     places[row, which], distances[row, which] = phi, rho
     close = np.flatnonzero(rho <= within)
     row, which = row[close], which[close]
@@ -82,11 +83,6 @@ def dips(curve: Discriminant, n: int, number: int, within: float) -> Singulariti
     none = np.flatnonzero(lost.any(axis=1))
     places[none, 0], distances[none, 0] = turn[lost[none].argmax(axis=1)], SHORTEST
     return Singularities(places, distances)
-
-
-def _elsewhere(n: int, number: int) -> tuple[Array, Array]:
-    """Placeholders for missing dips: far away, each at another angle."""
-    return np.tile(np.arange(1.0, 1.0 + NEAREST) + 0.1 * number, (n, 1)), np.full((n, NEAREST), FAR)
 
 
 def _closer(curve: Discriminant, row: Indices, phi: Array) -> tuple[Array, Array]:

@@ -168,7 +168,7 @@ class PeakSearch:
         hidden = doubtful(candidates, peaks, around, enough * size[candidates[:2]])
         least = [request.pose for request in self.requests if request.mode == -1 and not self.anywhere]
         angles = switches(self.family, self.designs[turn.rows], least)
-        beside = dips(self.requests, turn.columns, resolved) if angles.shape[1] else PeakCandidates.none()
+        beside = dips(self.requests, turn.columns, resolved)
         looks, phi = closer_looks(only(candidates, hidden), beside, angles, turn.samples)
         if len(phi):
             sample = self._sampler(self.family, turn, looks)

@@ -44,12 +44,6 @@ class PeakCandidates(NamedTuple):
     column: Indices
     sign: Array
 
-    @classmethod
-    def none(cls) -> PeakCandidates:
-        """Make an empty record."""
-        nothing = np.zeros(0, np.int64)
-        return cls(nothing, nothing, nothing, np.zeros(0))
-
 
 class Peaks(NamedTuple):
     """Refined peaks of k candidates, each (k,).

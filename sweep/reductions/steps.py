@@ -74,7 +74,7 @@ def _proven(
 
     assert accuracy.target is not None
     n = len(designs)
-    loops = [_loop(stage, designs) for stage in stages]
+    loops = [stage.family.the(CrankRockerLoop).matrix(stage.designs(designs)) for stage in stages]
     coupled = [designs[:, s.kappa : s.kappa + 2] for s in stages if s.kappa is not None]
     joined = np.reshape(coupled, (len(stages) - 1, n, 2))
     shares = guided.shares(stages[-1].designs(designs))
@@ -97,11 +97,6 @@ def _proven(
         columns |= proven_columns(name, wanted, accuracy.target, (value[j], error[j]), phi[j], searched_at)
         columns["status"] = np.where(columns["status"] == st.OK, status[j], columns["status"])
     return columns
-
-
-def _loop(stage: Stage, designs: Array) -> Array:
-    """Return a stage as a crank-rocker, (n, 8)."""
-    return stage.family.the(CrankRockerLoop).matrix(stage.designs(designs))
 
 
 @of_family
