@@ -28,7 +28,7 @@ SMALLEST_ANGLE = 2.0**-26  # its root
 
 Kind: TypeAlias = Literal[
     "max_abs", "max", "min", "range", "phi_max_abs", "phi_max", "phi_min", "ext", "fold", "phi_ext", "phi_fold", "phi0",
-    "phi_event", "difference", "scalar", "lengths", "least", "most", "box", "minus",
+    "phi_event", "stay", "difference", "scalar", "lengths", "least", "most", "box", "minus",
 ]  # fmt: skip
 Inner: TypeAlias = Literal["same", "pressure", "ratio", "rotatable", "square", "transmission"]
 
@@ -89,14 +89,14 @@ class Measure:
         """Whether the output is computed from crank angles of extrema or events."""
         if self.kind == "minus":
             return self.parts[0].is_angle
-        return self.kind.startswith("phi") or self.kind == "difference"
+        return self.kind.startswith("phi") or self.kind in ("difference", "stay")
 
     @property
     def is_least(self) -> bool:
         """Whether the output is a minimum of several values, each of which bounds it from above."""
         if self.kind == "minus":
             return not self.parts[0].is_least
-        return (self.kind in ("min", "least")) == (self.sign > 0.0)
+        return (self.kind in ("min", "least", "stay")) == (self.sign > 0.0)
 
     @property
     def follows_angles(self) -> bool:
@@ -222,6 +222,8 @@ def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[
             return _of_timing(family, timing, window)
         case kinds.EventPlace(event=e) if isinstance(family.domain, Turn) and not family.pose_output[quantity.of].wraps:
             return Measure(name, "phi_event", (Series(e.of, passes=(e.level, 1.0 if e.rising else -1.0)),))
+        case kinds.WindowAngle() if window not in (None, (0.0, 1.0)) and _is_smooth(family, quantity.of):
+            return Measure(name, "stay", (curve(family, quantity.of, window),))
         case kinds.Margin(kind=kind):
             return _of_margin(name, kind, margins(family, quantity.stage))
         case kinds.LimitPosition(kind=kind):
@@ -246,9 +248,15 @@ def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[
         case kinds.OwnOutput(of_part=True):
             raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
         case _:
-            # Means, counts, dwells, own outputs; passages of wrapped angles, and passages over an interval, are
-            # searched anew for every design.
+            # Means, counts, dwells, own outputs; passages and windows of wrapped angles, and passages over an interval,
+            # are searched anew for every design.
             return Measure(name, "scalar", (), numbers=(name,))
+
+
+def _is_smooth(family: Family, position: str) -> bool:
+    """Whether a position of a turning crank neither jumps by a full turn nor has kinks."""
+    pose = family.pose_output[position]
+    return isinstance(family.domain, Turn) and not (pose.wraps or pose.kinks or pose.jumps)
 
 
 def _of_timing(family: Family, timing: Timing | EventValue, window: tuple[float, float] | None) -> Measure:

@@ -174,13 +174,21 @@ class Curves:
         return np.zeros((len(designs), len(phi))) if margin is None else margin.at(designs, phi)
 
     def stroke(self, points: Points, n: int) -> tuple[int, int]:
-        """Return the points of smallest and largest position of the follower that defines the window of series n."""
+        """Return the points of smallest and largest position of the follower that defines the window of series n.
+
+        If the angle in the window is limited, they are those of the last scan, marked as fractions 0 and 1 of the
+        stroke: rows of every other top say what happens once that is the highest.
+        """
         limit_points = np.flatnonzero(
             (points.series == self.position[n]) & np.isin(points.kind, (scanned.STATIONARY, scanned.EDGE))
         )
         low, high = limit_points[points.sense[limit_points] < 0], limit_points[points.sense[limit_points] > 0]
         if not len(low) or not len(high):
             return -1, -1
+        ends = limit_points[points.kind[limit_points] == scanned.STATIONARY]
+        fixed = ends[np.isin(points.level[ends], (0.0, 1.0))]
+        if len(fixed):
+            return int(fixed[points.level[fixed] == 0.0][0]), int(fixed[points.level[fixed] == 1.0][0])
         return int(low[np.argmin(points.value[low])]), int(high[np.argmax(points.value[high])])
 
     def follow(self, design: Array, points: Points, stride: float = STRIDE) -> Points:
@@ -289,6 +297,8 @@ class Curves:
         low, high = self.stroke(points, n)
         if series.window is None or low < 0:
             return []
+        if series.output == self.series[self.position[n]].output:
+            points.level[[low, high]] = 0.0, 1.0
         s = columns[self.series[self.position[n]].output][0]
         share = (s - points.value[low]) / (points.value[high] - points.value[low])
         x = columns[series.output][0]

@@ -14,7 +14,7 @@ from sweep.families.base import Array
 from sweep.families.machines.machine import Machine
 from sweep.optimise.extrema.points import Curves, Points
 from sweep.optimise.extrema.scanned import first_passage
-from sweep.optimise.problem.rows import Form, Label, Term, box_sums, number_sums
+from sweep.optimise.problem.rows import Form, Label, Stay, Term, box_sums, number_sums
 from sweep.optimise.problem.statement import PLACE, Problem
 from sweep.quantities.measures import Measure, Series, margins, measure
 from sweep.quantities.resolve import output
@@ -99,6 +99,7 @@ class Program:
         complete = turns
         for requirement in self.requirements:
             complete = layout.require(requirement) and complete
+        layout.keep_inside(self.objective)
         sums = layout.upper(self.objective)
         for term, shift in sums:
             layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
@@ -151,6 +152,8 @@ class _Layout:
         """Add the rows of one limit; return False if the design has no extremum of the limited output."""
         exists = True
         self._exclude_earlier_passages(r, "minimum" if r.maximum is None else "maximum")
+        if r.measure.kind == "minus" or r.minimum is not None:
+            self.keep_inside(r.measure, r.minimum)
         sides = [("minimum", r.minimum, 1.0, r.lower_shift), ("maximum", r.maximum, -1.0, r.upper_shift)]
         for side, bound, sense, change in [("equal", r.minimum, 1.0, NO_SHIFT)] if r.equal else sides:
             if bound is None:
@@ -189,6 +192,9 @@ class _Layout:
         if m.kind == "phi_event":
             first, _ = self._passage(m.series[0])
             return [] if first is None else [({len(self.points) + first: 1.0}, self._turn_shift(first))]
+        if m.kind == "stay":
+            stay = self._stay(m)
+            return [] if stay is None else stay.sums(above)
         maxima, minima = self._extrema(m.series)
         if m.kind in ("max", "min"):
             every = above == (m.kind == "max")
@@ -268,6 +274,20 @@ class _Layout:
             for k in self._passage(series)[1]:
                 size = violation_scale(max(abs(level), 1e-3 * abs(self.points.value[k])))
                 self.add({k: -sense}, 0.0, 1.0 / size, sense * level / size, 0.0, False, Label(r.measure.name, side))
+
+    def _stay(self, m: Measure) -> Stay | None:
+        """Return what a follower does in its window; None if it has no limit positions."""
+        n = self.curves.series.index(m.series[0])
+        low, high = self.curves.stroke(self.points, n)
+        tops, bottoms = self._extrema([self.curves.series[self.curves.position[n]]])
+        return None if low < 0 else Stay(self.points, n, m.series[0].window or (0.0, 1.0), (low, high), bottoms, tops)
+
+    def keep_inside(self, m: Measure, least: float | None = None) -> None:
+        """Keep the tops and dips of a window inside it, as far as its angle, or the ``least`` one, needs them."""
+        m, least = (m.parts[0], None) if m.kind == "minus" else (m, least)
+        stay = self._stay(m) if m.kind == "stay" else None
+        for term, shift in [] if stay is None else stay.inside(least):
+            self.add(term, shift, 1.0, 0.0, 0.0, False, Label(m.name, "minimum", 0.0))
 
     def _extension_sign(self, position: str) -> float:
         """Return +1 if the extended position of the follower is the largest, -1 if it is the smallest."""

@@ -5,6 +5,7 @@ Atoms are the quantities with known gradients: the curves at K points, the point
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,7 @@ import numpy as np
 from sweep.families.base import Array
 from sweep.numerics.records import Mask
 from sweep.optimise.extrema.points import Points
+from sweep.optimise.extrema.scanned import CROSSING, STATIONARY
 from sweep.quantities.measures import Measure
 
 NEAR_BOUND = 0.6  # scaled distance from its bound beyond which a row is left out at first
@@ -162,3 +164,89 @@ def box_sums(
     foremost, rearmost = sorted([*maxima, *fixed], reverse=True)[:JOINTS], sorted([*minima, *fixed])[:JOINTS]
     pairs = [(i, j) for _, i in foremost for _, j in rearmost if i != j]
     return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
+
+
+INSIDE = 1e-6  # share of a window by which a top or dip that touches its edge stays inside: decidable from samples
+LIMIT_POSITIONS = 4  # highest and lowest limit positions that may come to define the stroke
+
+
+@dataclass(frozen=True)
+class Stay:
+    """Window of a follower's position, at one design.
+
+    ``ends`` are the limit positions between which the tracked edges of the window lie; ``bottoms`` and ``tops`` are all
+    of them, lowest and highest first, as numbers of points.
+    """
+
+    points: Points
+    series: int
+    window: tuple[float, float]
+    ends: tuple[int, int]
+    bottoms: list[int]
+    tops: list[int]
+
+    def sums(self, above: bool) -> list[tuple[Term, float]]:
+        """Return sums of atoms for the crank angle in the window: of leaving poses less that of entering ones.
+
+        It is below a bound if the first sum is, and above a bound if all are: each further top raises the lower edge
+        of the window, each further bottom lowers the upper one.  An edge of other ends is extrapolated linearly, which
+        is exact where they are as high as the tracked ones: there the row is active.
+        """
+        points, signs = self.points, self._signs()
+        if not signs:
+            return []
+        turns = -math.tau * math.floor(sum(sign * points.phi[k] for k, sign in signs.items()) / math.tau)
+        narrowed = list(itertools.product(self._strokes(0), self._strokes(1)))
+        sums = []
+        for strokes in narrowed[:1] if above else narrowed:
+            term: Term = {len(points) + k: sign for k, sign in signs.items()}
+            for k, sign in signs.items():
+                weight, share = sign / float(points.position_slope[k]), float(points.level[k])
+                _add_level(term, share, strokes[0 if share == self.window[0] else 1], weight)
+                _add_level(term, share, self.ends, -weight)
+            sums.append((term, turns))
+        return sums
+
+    def inside(self, least: float | None) -> list[tuple[Term, float]]:
+        """Return sums that are positive while tops and dips stay inside the window.
+
+        If one leaves it by d, the angle loses 2 (2 d / |curvature|)^(1/2), with an infinite slope at d = 0.  What the
+        angle has in excess of its ``least`` value e may be lost: d <= |curvature| e^2 / 8, here linear in e.
+        """
+        points, rows, atoms = self.points, [], np.concatenate([self.points.value, self.points.phi])
+        size = (self.window[1] - self.window[0]) * float(points.value[self.ends[1]] - points.value[self.ends[0]])
+        angles = [] if least is None else self.sums(above=True)
+        within = (points.series == self.series) & (points.kind == STATIONARY)
+        for k in np.flatnonzero(within).tolist():
+            edge, sense = (0, -1.0) if points.sense[k] < 0.0 else (1, 1.0)
+            for stroke in self._strokes(edge) if 0.0 < self.window[edge] < 1.0 else []:
+                term, shift = {k: -sense / size}, -INSIDE
+                _add_level(term, self.window[edge], stroke, sense / size)
+                for angle, turns in angles:
+                    excess = max(sum(w * float(atoms[j]) for j, w in angle.items()) + turns - (least or 0.0), 0.0)
+                    rate = abs(float(points.curvature[k])) * excess / (4.0 * size)
+                    for j, w in angle.items():
+                        term[j] = term.get(j, 0.0) + rate * w
+                    shift += rate * (turns - (least or 0.0) - 0.5 * excess)
+                rows.append((term, shift))
+        return rows
+
+    def _signs(self) -> dict[int, float]:
+        """Return +1 for every pose that leaves the window and -1 for every pose that enters it."""
+        points = self.points
+        edges = np.flatnonzero((points.series == self.series) & (points.kind == CROSSING) & (points.sense > 0.0))
+        outward = np.where(points.level[edges] == self.window[0], -1.0, 1.0) * points.position_slope[edges]
+        return dict(zip(edges.tolist(), np.sign(outward).tolist(), strict=True))
+
+    def _strokes(self, edge: int) -> list[tuple[int, int]]:
+        """Return the ends of the stroke, then others of which each narrows the window at this edge."""
+        low, high = self.ends
+        tops, bottoms = self.tops[:LIMIT_POSITIONS], self.bottoms[:LIMIT_POSITIONS]
+        others = [(low, k) for k in tops] if edge == 0 else [(k, high) for k in bottoms]
+        return [self.ends, *(s for s in others if s != self.ends and 0.0 < self.window[edge] < 1.0)]
+
+
+def _add_level(term: Term, share: float, stroke: tuple[int, int], weight: float) -> None:
+    """Add the position at a share of the stroke between two limit positions, multiplied by a weight."""
+    for end, part in zip(stroke, (1.0 - share, share), strict=True):
+        term[end] = term.get(end, 0.0) + weight * part
