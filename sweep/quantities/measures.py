@@ -248,15 +248,15 @@ def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[
         case kinds.OwnOutput(of_part=True):
             raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
         case _:
-            # Means, counts, dwells, own outputs; passages and windows of wrapped angles, and passages over an interval,
-            # are searched anew for every design.
+            # Means, counts, dwells, own outputs; passages of wrapped angles, and passages over an interval, are
+            # searched anew for every design.
             return Measure(name, "scalar", (), numbers=(name,))
 
 
 def _is_smooth(family: Family, position: str) -> bool:
-    """Whether a position of a turning crank neither jumps by a full turn nor has kinks."""
+    """Whether the position of a turning crank has neither kinks nor jumps."""
     pose = family.pose_output[position]
-    return isinstance(family.domain, Turn) and not (pose.wraps or pose.kinks or pose.jumps)
+    return isinstance(family.domain, Turn) and not (pose.kinks or pose.jumps)
 
 
 def _of_timing(family: Family, timing: Timing | EventValue, window: tuple[float, float] | None) -> Measure:

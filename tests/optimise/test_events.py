@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 import sweep
+from sweep.families import family
 from sweep.families.base import Accuracy
 from sweep.optimise.extrema.scanned import PASSING, first_passage, passages
 from sweep.optimise.local.model import Model
@@ -42,6 +43,37 @@ def test_slopes_of_events_are_exact(output: str) -> None:
         # What the five points leave out is of fourth order in a thousandth of the dimension; roots carry 1e-14/step.
         assert rows.loc[name, "growing"] == pytest.approx(slope, rel=1e-7, abs=1e-10), name
         assert rows.loc[name, "growing"] == rows.loc[name, "shrinking"]
+
+
+# A rocker whose angle passes 180 degrees, where it jumps by a turn, and a six-bar with a dip to 0.995 of its stroke.
+ROCKER = {"a": 10.0, "b": 21.0, "c": 35.0, "e": 38.0, "f": 16.0, "g": 17.0, "alpha": 0.7, "branch": 1.0}
+SIX_BAR = {
+    "a1": 5.26, "b1": 37.7, "c1": 16.4, "e1": 40.0, "f1": 0.0, "g1": 0.0, "alpha1": 0.0, "branch1": -1.0,
+    "a2": 47.9, "b2": 20.0, "e2": 40.0, "branch2": 1.0, "offset2": -0.99,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("window", [(0.9, 1.0), (0.0, 0.2), (0.3, 0.7), (0.5, 0.997), (0.997, 1.0)])
+@pytest.mark.parametrize(("chain", "table"), [(["rssr"], ROCKER), (["rssr", "slider_crank"], SIX_BAR)])
+def test_slopes_of_the_angle_in_a_window_are_exact(
+    chain: list[str], table: dict[str, float], window: tuple[float, float]
+) -> None:
+    full = family(chain if len(chain) > 1 else chain[0])
+    design = np.array([table.get(p.name, p.default) for p in full.parameters], np.float64)
+
+    def angle(changed: dict[str, float]) -> float:
+        found = sweep.summarise(full, table | changed, ["window_angle"], accuracy=1e-12, window=window)
+        return float(found["window_angle"][0])
+
+    rows = pd.DataFrame(sensitivities(full, design, ["window_angle"], window)).set_index("parameter")
+    # Edges are tracked to the square of 3e-6 rad.
+    assert rows["value"].iloc[0] == pytest.approx(angle({}), abs=1e-10)
+    for name in [n for n in table if n[0] in "abco" and not n.startswith("branch")]:
+        step = 1e-4 if name.startswith(("alpha", "offset")) else 1e-3
+        ends = [angle({name: table[name] + k * step}) for k in (-2.0, -1.0, 1.0, 2.0)]
+        slope = (ends[0] - 8.0 * ends[1] + 8.0 * ends[2] - ends[3]) / (12.0 * step)
+        # Five points leave out the fourth power of the step; the errors of the angles are 1e-12 / step.
+        assert rows.loc[name, "growing"] == pytest.approx(slope, rel=1e-6, abs=1e-8), name
 
 
 def model(limit: Limit) -> Model:

@@ -97,8 +97,17 @@ def test_design_that_does_not_turn_has_none():
     assert found.status[0] != 0 and np.isnan(found.window_angle[0])
 
 
-def test_optimiser_takes_it_as_a_number():
-    assert measure(family("rssr"), "window_angle").kind == "scalar"
+@pytest.mark.parametrize("name", ["rssr", "rssp"])
+def test_optimiser_follows_the_edges_of_a_window(name):
+    assert measure(family(name), "window_angle", (0.9, 1.0)).kind == "stay"
+    # Without a window there is no angle, and the whole stroke takes the whole turn.
+    assert measure(family(name), "window_angle").kind == "scalar"
+    assert measure(family(name), "window_angle", (0.0, 1.0)).kind == "scalar"
+
+
+def test_optimiser_takes_the_window_of_a_cam_as_a_number():
+    # A motion law may have kinks, beside which no slope predicts anything.
+    assert measure(family("cam"), "window_angle", (0.9, 1.0)).kind == "scalar"
 
 
 GUIDE = {"a": 10.0, "b": 25.0, "c": 25.0, "e": 20.0, "xi": 50.0, "eta": 3.0, "lam": 1.5, "h": 0.3}

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from kernels.types import TWO_PI
 from sweep.families.base import Angles, Array
 from sweep.families.poses import differentiable
 from sweep.numerics.records import Indices
@@ -286,8 +287,12 @@ class Curves:
             crossing = (points.kind == scanned.CROSSING) & (points.series == n)
             low, high = self.stroke(points, n)
             if low >= 0:
-                target = position[low] + points.level[crossing] * (position[high] - position[low])
-                move[crossing] = -(position[crossing] - target) / position_slope[crossing]
+                wrapped, stroke = self.series[self.position[n]].wrapped, position[high] - position[low]
+                if wrapped:  # both ends of the stroke count whole turns, as at the last design
+                    stroke += TWO_PI * np.round((points.value[high] - points.value[low] - stroke) / TWO_PI)
+                beyond = position[crossing] - (position[low] + points.level[crossing] * stroke)
+                beyond = np.remainder(beyond + math.pi, TWO_PI) - math.pi if wrapped else beyond
+                move[crossing] = -beyond / position_slope[crossing]
 
     def _in_window(
         self, n: int, design: Array, phi: Array, columns: dict[str, Any], points: Points
@@ -297,11 +302,11 @@ class Curves:
         low, high = self.stroke(points, n)
         if series.window is None or low < 0:
             return []
-        if series.output == self.series[self.position[n]].output:
+        position = self.series[self.position[n]]
+        if series.output == position.output:
             points.level[[low, high]] = 0.0, 1.0
-        s = columns[self.series[self.position[n]].output][0]
+        s, x = (np.unwrap(columns[c.output][0]) if c.wrapped else columns[c.output][0] for c in (position, series))
         share = (s - points.value[low]) / (points.value[high] - points.value[low])
-        x = columns[series.output][0]
         rows = []
         for edge in series.window:
             if edge in (0.0, 1.0):
