@@ -153,7 +153,7 @@ class _Layout:
         exists = True
         self._exclude_earlier_passages(r, "minimum" if r.maximum is None else "maximum")
         if r.measure.kind == "minus" or r.minimum is not None:
-            self.keep_inside(r.measure, r.minimum)
+            self.keep_inside(r.measure, r.minimum, "equal" if r.equal else "minimum")
         sides = [("minimum", r.minimum, 1.0, r.lower_shift), ("maximum", r.maximum, -1.0, r.upper_shift)]
         for side, bound, sense, change in [("equal", r.minimum, 1.0, NO_SHIFT)] if r.equal else sides:
             if bound is None:
@@ -282,12 +282,12 @@ class _Layout:
         tops, bottoms = self._extrema([self.curves.series[self.curves.position[n]]])
         return None if low < 0 else Stay(self.points, n, m.series[0].window or (0.0, 1.0), (low, high), bottoms, tops)
 
-    def keep_inside(self, m: Measure, least: float | None = None) -> None:
+    def keep_inside(self, m: Measure, least: float | None = None, side: str = "minimum") -> None:
         """Keep the tops and dips of a window inside it, as far as its angle, or the ``least`` one, needs them."""
         m, least = (m.parts[0], None) if m.kind == "minus" else (m, least)
         stay = self._stay(m) if m.kind == "stay" else None
         for term, shift in [] if stay is None else stay.inside(least):
-            self.add(term, shift, 1.0, 0.0, 0.0, False, Label(m.name, "minimum", 0.0))
+            self.add(term, shift, 1.0, 0.0, 0.0, False, Label(m.name, side, 0.0))
 
     def _extension_sign(self, position: str) -> float:
         """Return +1 if the extended position of the follower is the largest, -1 if it is the smallest."""
