@@ -21,6 +21,7 @@ from sweep.study import Limit, Study
 from sweep.study.parameter import definition
 
 ACTIVE = 1e-5  # distance of the optimum from a limit, relative to its size, below which the limit is active
+DWELLS = 0.1  # error of a place [rad] above which it is one of many equally good ones
 
 
 @dataclass(frozen=True)
@@ -165,12 +166,14 @@ def output_rows(data: Dataset) -> list[OutputRow]:
     for name in dict.fromkeys([*objective, *study.want]):
         shown = data.shown(name)
         value, other = value_of(data.result, name), value_of(data.reference, name)
-        flag = is_flag(name)
+        flag, error = is_flag(name), value_of(data.result, error_of(name))
+        text = data.definitions.get(name, shown.words).removeprefix(f"negative of {without_minus(name)}: ")
+        blurred = is_place(name) and error > DWELLS
         rows.append(
             OutputRow(
                 name=name,
                 symbol=shown.symbol,
-                text=data.definitions.get(name, shown.words).removeprefix(f"negative of {without_minus(name)}: "),
+                text=f"{text}; one angle of a dwell, known to ±{shown.show(error, 2)}" if blurred else text,
                 value=_yes(value) if flag else shown.show(value),
                 fast=shown.at_speed(value, study.speed),
                 reference=_yes(other) if flag else shown.show(other),

@@ -182,7 +182,7 @@ def _study(
     if space is not None and fit is None and (locus is None or sections.optimise.variables != "parameters"):
         check_varied(file, family, space, inputs.raw)
     tolerance = read_tolerance(sections.tolerance, file, family)
-    check_tolerance(tolerance, family, limits, faults)
+    check_tolerance(tolerance, family, limits, space, faults)
     reference = read_reference(taken_reference(file, sections.reference), bare, family, faults, other, space)
     check_report(sections.report, file, family, prescribed)
     prescribed_names = [*prescribed, *(name for name in file.free_table("locus") or () if name.startswith(RATIOS))]

@@ -9,6 +9,7 @@ from sweep.errors import nearest
 from sweep.families.base import Family
 from sweep.quantities.limits import Limit
 from sweep.study.file import Faults, PositiveAngle, PositiveLength, Section, Share, StudyFile, holds
+from sweep.study.space import DesignSpace
 from sweep.study.study import Tolerance
 
 UNITS = {"length": "mm", "angle": "rad"}
@@ -62,16 +63,32 @@ def _of_patterns(given: Mapping[str, str], file: StudyFile, family: Family) -> d
     return tolerances
 
 
-def check_tolerance(tolerance: Tolerance | None, family: Family, limits: tuple[Limit, ...], faults: Faults) -> None:
-    """Report tolerances without effect, and a robust search with equations as limits."""
+def check_tolerance(
+    tolerance: Tolerance | None, family: Family, limits: tuple[Limit, ...], space: DesignSpace | None, faults: Faults
+) -> None:
+    """Report tolerances without effect or as large as a link, and a robust search with equations as limits."""
     if tolerance is None:
         return
     for key, unit, size in (("lengths", "length", tolerance.lengths), ("angles", "angle", tolerance.angles)):
         if size > 0.0 and not any(p.unit == unit and p.choices is None for p in family.parameters):
             allowed = f"nothing: {family.name} has no {key} that could deviate"
             faults.value(("tolerance", key), f"{size:.6g} {UNITS[unit]}", allowed)
+    if space is not None:
+        _check_links(tolerance, family, space, faults)
     with_room = [x.output for x in limits if x.minimum != x.maximum]
     equations = [x.output for x in limits if x.is_equation and x.output not in with_room]
     if tolerance.robust is not None and equations:
         words = 'limits with room, as swing = "40 +- 0.2 deg": no mechanism that is made keeps an equation'
         faults.value(("tolerance", "robust"), ", ".join(equations), words)
+
+
+def _check_links(tolerance: Tolerance, family: Family, space: DesignSpace, faults: Faults) -> None:
+    """Report a tolerance that leaves nothing of a link, however long it is in the space, by the shortest such link."""
+    longest, own = {**space.fixed, **{axis.name: axis.high for axis in space.axes}}, dict(tolerance.own)
+    links = [p.name for p in family.parameters if p.positive and p.unit == "length" and p.name in longest]
+    for name in sorted(links, key=longest.__getitem__):
+        width = own.get(name, tolerance.lengths)
+        if width >= longest[name]:
+            key = ("tolerance", "own" if name in own else "lengths")
+            faults.value(key, f"{width:.6g} mm", f"less than the links: {name} is at most {longest[name]:.6g} mm")
+            return

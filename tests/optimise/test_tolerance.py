@@ -290,6 +290,11 @@ def test_study_writes_its_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         ('[tolerance]\nlengths = "0.02 deg"\n', "tolerance.lengths"),
         ('[tolerance]\nangles = "-1 deg"\n', "positive"),
         ('[tolerance]\nlenghts = "0.02 mm"\n', "lengths"),
+        (
+            '[tolerance]\nlengths = "300 mm"\n',
+            "tolerance.lengths = '300 mm'; allowed: less than the links: a is at most",
+        ),
+        ('[tolerance]\nlengths = "0.02 mm"\nown = { b = "7 m" }\n', "tolerance.own = '7000 mm'; allowed: .*: b is at"),
     ],
 )
 def test_bad_tolerances_are_named(tmp_path: Path, table: str, message: str) -> None:

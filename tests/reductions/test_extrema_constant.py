@@ -99,6 +99,12 @@ def test_a_constant_beside_a_phase_that_ends_just_after_the_angle_0_is_found(sta
     assert found.status == st.OK
     assert found.max_y_r == found.min_y_r == -0.4
     assert max(found.err_max_y_r, found.err_min_y_r) <= 1e-14
+    places = ["phi_max_y_r", "phi_min_y_r", "phi_max_abs_y_r"]
+    found = sweep.summarise("cam", cam, places, accuracy=TARGET).iloc[0]
+    assert found.status == st.OK
+    for name in places:  # any angle would do: panels know no seam of the turn, and span it from end to end
+        far = max(found[name], 2.0 * np.pi - found[name])
+        assert far - 1e-9 <= found[f"err_{name}"] <= 2.0 * np.pi + 1e-9
 
 
 @pytest.mark.parametrize("accuracy", [1e-3, 1e-9])

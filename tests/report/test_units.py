@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from kernels import status as codes
+from sweep.engine.run import run
 from sweep.optimise.multistart.survey import Survey
 from sweep.report.answer import survey_warnings
 from sweep.report.dataset import Dataset, gather, without_rows
@@ -17,6 +18,7 @@ from sweep.report.front import Front
 from sweep.report.page import write_report
 from sweep.report.quantities import quantity
 from sweep.report.scan import scan
+from sweep.report.tables import output_rows
 from sweep.study import study_from_data
 from tests.support.report_dataset import DATA, study_data, write_dataset
 
@@ -104,3 +106,16 @@ def test_trade_off_of_at_least_has_the_points_of_the_sweep(tmp_path) -> None:
 def test_page_without_tolerances_does_not_speak_of_what_is_made(tmp_path) -> None:
     page = write_report(write_dataset(tmp_path / "designs", optimum={})).read_text(encoding="utf-8")
     assert "As it is made" not in page and "Yield" not in page
+
+
+def test_place_anywhere_on_a_dwell_says_so_beside_its_definition(tmp_path) -> None:
+    """The cam stands still over a quarter turn at full lift: its middle looked like the angle where the rise ends."""
+    cam = {
+        "study": {"name": "cam"}, "mechanism": {"family": "cam"}, "scene": {"want": ["phi_ext", "phi_max_ds"]},
+        "design": {"lift": {"from": 8.0, "to": 9.0, "count": 2, "unit": "mm"}, "r0": "40 mm"},
+        "accuracy": {"target": 1e-6},
+    }  # fmt: skip
+    data, _, _ = gather(run(study_from_data(cam, "study.toml"), tmp_path / "designs", jobs=1))
+    rows = {row.name: row.text for row in output_rows(data)}
+    assert rows["phi_ext"].endswith("where s is largest; one angle of a dwell, known to ±91°")
+    assert rows["phi_max_ds"].startswith("crank angle of the largest value of ds") and ";" not in rows["phi_max_ds"]
