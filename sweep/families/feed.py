@@ -13,7 +13,7 @@ import numpy as np
 
 from kernels.families import feed
 from kernels.status import NO_EVENT, NOT_ASSEMBLED, NOT_CONVERGED, OK
-from kernels.types import EPS, Array
+from kernels.types import EPS, TWO_PI, Array
 from sweep.families.base import (
     Accuracy,
     Angles,
@@ -37,6 +37,7 @@ from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, moving, parameter, standing
 from sweep.numerics.records import Mask
+from sweep.numerics.singularities import singularities
 
 PARAMETERS = parameters_of("feed")
 
@@ -73,6 +74,8 @@ FEEDING_OUTPUTS = (
     Output("crossings", "1", "passages of the plate per turn", "(11)", jumps=True),
 )
 
+_ENDS_OF_LIFT = ("x_h", "y_h", "x_e", "y_e")
+_CLOSE = 0.3  # distance of a lock [rad] below which it is located better than samples show it
 _LENGTHS = [k for k, p in enumerate(PARAMETERS) if p.unit == "length"]
 
 
@@ -114,31 +117,73 @@ CHAIN_LINKS = (CRANK, COUPLER, Link("rocker", ("d", "c", "h")))
 
 def lift_loop(designs: Array, angles: Angles, found: Columns) -> Array:
     """Compute Heron's product of the triangle H, E, F, (n, m): 16 times its squared area."""
-    x_h, y_h, x_e, y_e = floats(found, "x_h", "y_h", "x_e", "y_e")
+    x_h, y_h, x_e, y_e = floats(found, *_ENDS_OF_LIFT)
     q, fx, fy = dimensions(PARAMETERS, designs, "q", "fx", "fy")
     w, f = np.hypot(x_h - x_e, y_h - y_e), np.hypot(fx, fy)
     product: Array = ((w + f) - q) * ((w + f) + q) * (q - (w - f)) * (q + (w - f))
     return product
 
 
+def _locks(designs: Array, angles: Angles) -> tuple[Array, Array]:
+    """Shares of the discriminants in their terms, of rocker and rack, (n, m): 0 where a loop locks."""
+    found = poses(designs, angles, frozenset(_ENDS_OF_LIFT))
+    x_h, y_h, x_e, y_e = floats(found, *_ENDS_OF_LIFT)
+    q, fx, fy = dimensions(PARAMETERS, designs, "q", "fx", "fy")
+    rack = lift_loop(designs, angles, found) / (np.hypot(x_h - x_e, y_h - y_e) + np.hypot(fx, fy) + q) ** 4
+    h_b, h_c = dimensions(PARAMETERS, designs, "h_b", "h_c")
+    return rocker_loop(PARAMETERS, designs, angles, found) / (2.0 * h_b * h_c) ** 2, rack
+
+
+def _amplified(designs: Array, entry: Array, leave: Array) -> Array:
+    """Factor by which rounding grows near a lock at entry, at leaving, and at most on the way between them, (n, 3)."""
+    loops = [lambda rows, phi, k=k: _locks(designs[rows], Angles.of(phi))[k] for k in range(2)]
+    near = singularities(loops, len(designs), _CLOSE)
+    phi = np.column_stack([entry, leave, near.phi])
+    rocker, rack = (1.0 / np.sqrt(np.fmax(share, 0.0)) for share in _locks(designs, Angles.of(phi)))
+    found = 1.0 + rocker + rack
+    passed = np.mod(phi - entry[:, None], TWO_PI) <= np.mod(leave - entry, TWO_PI)[:, None]
+    passed[:, :2] = True
+    return np.column_stack([found[:, :2], np.where(passed, found, 1.0).max(axis=1)])
+
+
+def _errors(designs: Array, columns: dict[str, Array], area_error: Array) -> dict[str, Array]:
+    """Estimate the errors of `FEEDING_OUTPUTS`, (n,) each, from the rounding of the path of a tooth.
+
+    Near a lock a place loses digits like the inverse root of a discriminant, and a speed twice as many.
+    """
+    size = np.abs(designs[:, _LENGTHS]).sum(axis=1)
+    ends = np.column_stack([columns["phi_entry"], columns["phi_leave"]])
+    near_one = designs.copy()
+    near_one[:, _LENGTHS] = np.ldexp(designs[:, _LENGTHS], -np.frexp(size)[1][:, None])
+    grown = _amplified(near_one, *ends.T)
+    place = EPS * size[:, None] * (16.0 + 4.0 * grown)
+    at = poses(designs, Angles.of(ends), frozenset(("dpsi", "dchi", "dx_t", "dy_t", "d2y_t")))
+    dpsi, dchi, dx, dy, d2y = (np.abs(x) for x in floats(at, "dpsi", "dchi", "dx_t", "dy_t", "d2y_t"))
+    angle = place[:, :2] / dy
+    speed = place[:, :2] + 4.0 * EPS * size[:, None] * (1.0 + dpsi + dchi) * grown[:, :2] ** 2 + angle * d2y
+    stitch, rise = (place[:, :2] + angle * dx).sum(axis=1), place[:, 2]
+    longest = np.abs(columns["stitch_length"])
+    flat = np.fmax(np.abs(columns["flatness"]), 1.0) * (rise / columns["rise"] + stitch / longest)
+    return {
+        "phi_entry": angle[:, 0], "phi_leave": angle[:, 1], "feed_angle": angle.sum(axis=1),
+        "entry_speed": speed[:, 0], "leave_speed": speed[:, 1], "stitch_length": stitch, "rise": rise,
+        "flatness": flat + rise * size / (columns["rise"] * longest) + area_error, "crossings": np.zeros(len(designs)),
+    }  # fmt: skip
+
+
 def events(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Compute entry, leaving and feed between them, with errors estimated from the rounding of a tooth's height."""
+    """Compute entry, leaving and feed between them, with errors estimated from the rounding of a tooth's path."""
     status, values = np.empty(len(designs), np.uint8), np.empty((len(FEEDING_OUTPUTS) + 1, len(designs)))
     feed.feeding(designs, status, values)
     *events, area_error = values
     columns: dict[str, Array] = {o.name: x for o, x in zip(FEEDING_OUTPUTS, events, strict=True)}
+    feeds = np.flatnonzero(status == OK)
     with np.errstate(all="ignore"):
-        height = 16.0 * EPS * np.abs(designs[:, _LENGTHS]).sum(axis=1)
-        angle = height * (1.0 / np.abs(columns["entry_speed"]) + 1.0 / np.abs(columns["leave_speed"]))
-        # accelerations of a tooth are of the size of the lengths: a shift of the event changes speeds accordingly
-        size = np.abs(designs[:, _LENGTHS]).sum(axis=1)
-        errors = {
-            "phi_entry": angle, "phi_leave": angle, "feed_angle": angle, "entry_speed": height + angle * size,
-            "leave_speed": height + angle * size, "stitch_length": height + angle * size, "rise": height,
-            "flatness": np.fmax(np.abs(columns["flatness"]), 1.0)
-            * (height / columns["rise"] + (height + angle * size) / np.abs(columns["stitch_length"])) + area_error,
-            "crossings": np.zeros(len(designs)),
-        }  # fmt: skip
+        known = _errors(designs[feeds], {name: x[feeds] for name, x in columns.items()}, area_error[feeds])
+    errors = {name: np.full(len(designs), np.nan) for name in known}
+    for name, error in known.items():
+        errors[name][feeds] = error
+    errors["crossings"][:] = 0.0
     if "flatness" in wanted:  # a path that the tooth retraces encloses no area
         retraced = (status == OK) & (columns["stitch_length"] == 0.0)
         status[retraced], columns["flatness"][retraced] = NO_EVENT, np.nan
@@ -170,7 +215,7 @@ FAMILY = Family(
     points={k: (f"x_{k}", f"y_{k}", None) for k in ("h", "e", "f", "t")},
     capabilities=(
         Singular(partial(rocker_loop, PARAMETERS)),
-        Singular(lift_loop, ("x_h", "y_h", "x_e", "y_e")),
+        Singular(lift_loop, _ENDS_OF_LIFT),
         SIZES,
         two_leads(PARAMETERS),
         SKELETON,
