@@ -130,7 +130,10 @@ def variable(family: Family, designs: Array, turned: Array, err: Array) -> tuple
 
 
 def _place(low: Array, high: Array, cos: Array) -> Array:
-    return 0.5 * (low + high) - 0.5 * (high - low) * cos
+    """Variable at angles of the closed turn, measured from the nearer end: exact there, and never beyond it."""
+    half = 0.5 * (high - low)
+    place: Array = np.where(cos.real < 0.0, high - half * (1.0 + cos), low + half * (1.0 - cos))
+    return place
 
 
 def _poses(poses: PoseFunction, domain: Interval, designs: Array, angles: Angles, wanted: frozenset[str]) -> Columns:

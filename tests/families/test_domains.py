@@ -6,6 +6,7 @@ found to rounding, which 1e-12 leaves room for.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,22 @@ def test_extrema_over_an_interval_count_its_ends() -> None:
     np.testing.assert_allclose(found["max_tension"], [4.0, 16.0, 64.0], rtol=1e-12)
     np.testing.assert_allclose(found["stroke"], [4.0, 15.0, 64.0], rtol=1e-12)
     np.testing.assert_allclose(found["rho_min_tension"], [2.0, 1.0, 9.0], atol=1e-5)  # flat: as the root of 1e-8 twice
+
+
+@pytest.mark.parametrize("length", [1e-13, 1e-12, 1e-6])
+def test_values_at_the_ends_of_an_interval_are_those_of_its_ends_however_short_it_is(length: float) -> None:
+    """In a line between the ends one rounding of the variable is a share of the way: 1.5e-4 of it at 1e-12."""
+
+    def straight(designs: Any, angles: Angles, wanted: frozenset[str]) -> dict[str, Any]:
+        share = (angles.phi - designs[:, 1:2]) / (designs[:, 2:] - designs[:, 1:2])
+        return {"tension": share, "dtension": share, **_no_status(angles.phi.shape)}
+
+    full = np.linspace(0.3, 0.9, 40)
+    table = pd.DataFrame({"p": 0.0, "low": full * (1.0 - length), "high": full})
+    names = ["min_tension", "max_tension"]
+    for accuracy in ({"accuracy": 1e-8}, {"samples": 360}):
+        found = sweep.summarise(replace(BEAM, poses=straight, events=()), table, names, **accuracy)
+        np.testing.assert_array_equal(found[names], np.tile([0.0, 1.0], (len(full), 1)))
 
 
 def test_stroke_of_three_over_an_interval_is_three_on_samples_too() -> None:
