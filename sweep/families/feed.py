@@ -36,8 +36,8 @@ from sweep.families.poses import chosen, filled_all
 from sweep.families.rssr import FAMILY as CRANK_ROCKER
 from sweep.families.sites import AXES
 from sweep.families.skeletons import COUPLER, CRANK, crank_axis, dimensions, links, moving, parameter, standing
-from sweep.numerics.records import Mask
-from sweep.numerics.singularities import singularities
+from sweep.numerics.records import Indices, Mask
+from sweep.numerics.singularities import dips, side_by_side
 
 PARAMETERS = parameters_of("feed")
 
@@ -136,8 +136,11 @@ def _locks(designs: Array, angles: Angles) -> tuple[Array, Array]:
 
 def _amplified(designs: Array, entry: Array, leave: Array) -> Array:
     """Factor by which rounding grows near a lock at entry, at leaving, and at most on the way between them, (n, 3)."""
-    loops = [lambda rows, phi, k=k: _locks(designs[rows], Angles.of(phi))[k] for k in range(2)]
-    near = singularities(loops, len(designs), _CLOSE)
+
+    def share(loop: int, rows: Indices, phi: Array) -> Array:
+        return _locks(designs[rows], Angles.of(phi))[loop]
+
+    near = side_by_side([dips(partial(share, loop), len(designs), loop, _CLOSE) for loop in range(2)])
     phi = np.column_stack([entry, leave, near.phi])
     rocker, rack = (1.0 / np.sqrt(np.fmax(share, 0.0)) for share in _locks(designs, Angles.of(phi)))
     found = 1.0 + rocker + rack
