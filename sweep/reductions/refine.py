@@ -30,6 +30,7 @@ RIPPLE = 0.25  # error per fourth difference, which is eight times the noise of 
 # them: there a fourth difference may vanish by chance, and halving the window only halves the error.
 BENT, CLOSELY_BENT = 0.4, 0.15  # change of second differences relative to the largest, of first and of later samples
 LEARNT = 0.8  # largest share of the previous error that a narrower window about a kink leaves
+FLAT = 64.0  # times EPS of a height: change of second differences that rounding may make
 LOST = 2.0  # blur, in steps, of a quartic whose bend is below its noise
 SHORTEST, SHORTEST_KINKED = 1e-6, 1e-12  # steps of the last windows relative to the samples' spacing
 BESIDE = 1e-3 * np.array([-2.0, -1.0, 1.0, 2.0])  # poses next to a place [rad]: two alike show a dwell
@@ -110,20 +111,22 @@ def sharpen(sample: Sampler, peaks: Peaks, tolerance: Array, locate: Array) -> P
         values = sample(active, phi[active, None] + u[:, None] * OFFSETS)
         place, top, ripple, blur = _quartic(values)
         kink = _kink(values, CLOSELY_BENT)
+        # On a top that is flat to rounding the window looks bent, but its highest pose is chance.
+        tip = kink > FLAT * EPS * np.abs(top)
         inside = np.abs(place) < 2.0
         claim = np.where(inside, CLAIM, 1.0)
         # Samples that deviate from a quartic are noise, which does not shrink with the window.
         error = claim * np.abs(top - height[active]) + RIPPLE * ripple + 4.0 * EPS * np.abs(top) + kink
         # Too small a window shows only noise: it may refine the height, but must not change the place.
-        misplaced = np.where(kink > 0.0, SHRINK_KINKED, 0.0)
+        misplaced = np.where(tip, SHRINK_KINKED, 0.0)
         err_place = u * (claim * np.abs(place) + blur + misplaced) + 4.0 * EPS * np.pi
         # Where noise hides the bend, the peak may lie anywhere about the window, however narrow it is.
-        err_place[inside & (blur >= LOST) & (kink == 0.0)] = np.inf
+        err_place[inside & (blur >= LOST) & ~tip] = np.inf
         err_place[~inside] = np.maximum(err_place, err_phi[active])[~inside]
         # At a kink the error shrinks with the window.  Noise looks bent too, but its error stays, and it is ignored.
         noisy = inside & (kink > 0.0) & (error >= LEARNT * err_height[active]) & (u < looked[active])
         looked[active] = np.where(inside, u, looked[active])
-        sharper = ~inside | (((err_place < err_phi[active]) | (kink > 0.0)) & ~noisy)
+        sharper = ~inside | (((err_place < err_phi[active]) | tip) & ~noisy)
         phi[active[sharper]] += (u * place)[sharper]
         height[active] = top
         err_height[active] = error
