@@ -23,7 +23,7 @@ from sweep.numerics.singularities import FAR, turn_edges
 from sweep.quantities.kinds import Request
 from sweep.reductions.fused import curve_of
 from sweep.reductions.resolution import denser, ends, nearest, series_of
-from sweep.reductions.rounding import ALONE, shaken, shaken_anywhere
+from sweep.reductions.rounding import ALONE, CANCELLED, plain, shaken, shaken_anywhere
 from sweep.reductions.sampling import DESIGN_STATUS, blocks, continued, pose_columns, sample_turn
 
 SAMPLES = 128  # first number of samples of a turn
@@ -106,11 +106,11 @@ def _refined(family: Family, designs: Array, pose: str, target: float) -> tuple[
         mean[rows], err[rows], status[rows] = _on_panels(family, designs[rows], pose, edges, target)
     lost = (status != st.OK) & (status != st.NOT_CONVERGED)
     mean[lost], err[lost] = np.nan, np.nan
-    if family.precise_poses is None and alive.size:
+    if plain(family) and alive.size:
         # Badly scaled designs lose digits in every pose: the mean may lose as much as the largest value.
         # Beside the top, which may be at a jump: rounding moves the jump, but hardly the mean.
         beside = top[alive] + (2.0 * NARROWEST if output.kinks or output.jumps else 0.0)
-        err[alive] = np.maximum(err[alive], shaken(family, designs[alive], beside, pose))
+        err[alive] = np.maximum(err[alive], CANCELLED * shaken(family.precise(), designs[alive], beside, pose))
     late = np.flatnonzero(status == st.NOT_CONVERGED)
     status[_alone(family, designs, late, pose, top, mean, err)] = st.OK
     return mean, err, status

@@ -23,7 +23,16 @@ from sweep.numerics.records import Indices
 from sweep.quantities.kinds import Request
 from sweep.reductions import sampling
 from sweep.reductions.resolution import MATTERS, ends, nearest, zeros
-from sweep.reductions.rounding import ALONE, order_of, rounding_by_pieces, shaken_anywhere, singular_share
+from sweep.reductions.rounding import (
+    ALONE,
+    CANCELLED,
+    order_of,
+    plain,
+    rounding_by_pieces,
+    shaken,
+    shaken_anywhere,
+    singular_share,
+)
 
 VANISHED = 1e-4  # share of the size below which a root counts as a zero: of a cube root of forces of 1e-12
 STEADY = 10.0 * AGAIN  # times EPS of a value: largest error claimed for a curve that is constant but for rounding
@@ -101,6 +110,11 @@ def _block(
             order = np.full(top.row.size, order_of(family, request.pose))
             share = singular_share(near, top.phi, order)
             rounding, lost = rounding + share * np.abs(top.value), share >= 1.0
+            output = family.pose_output[request.pose]
+            if plain(family) and not (output.kinks or output.jumps):
+                # Terms of what vanishes may be far larger than its values, and all poses share constants of a turn.
+                moved = shaken(family, designs[rows[top.row]], top.phi, request.pose)
+                rounding = np.maximum(rounding, CANCELLED * moved)
         # the range of a constant curve is rounding, which no target can refer to
         allowed = np.maximum(target * size[top.row], STEADY * EPS * np.abs(top.value))
         if request.mode == -1:
@@ -108,15 +122,13 @@ def _block(
             if any(len(known.parts) > 1 and known.of == request.pose for known in family.every(Smooth)):
                 # A magnitude is not below 0, however steep the zero that it passes.
                 np.minimum(top.err, -top.value, out=top.err, where=top.value <= 0.0)
-        jumps = family.pose_output[request.pose].jumps
-        if jumps:  # piecewise constant: a polynomial only adds rounding
+        if family.pose_output[request.pose].jumps:  # piecewise constant: a polynomial only adds rounding
             beside = top.phi[:, None] + NARROWEST * np.array([-1.0, 0.0, 1.0])  # it may jump at the place itself
             near_by, _ = sampling.pose_columns(family, designs[rows[top.row]], beside, [request.pose])
             heights = measured(near_by[request.pose], request.mode)
             side = np.abs(heights - top.value[:, None]).argmin(axis=1)
             top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
-        # A count may flicker where rounding decides: it is as a pose has it, and its error says what no pose excludes.
-        late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding) & (not jumps)))
+        late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding)))
         off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late], request.pose)
         noise = off >= ALONE * size[top.row[late]]
         top.err[late[noise]] = np.maximum(top.err[late], off)[noise]

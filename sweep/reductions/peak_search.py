@@ -305,12 +305,13 @@ class PeakSearch:
         np.maximum.at(ceiling, row, peaks.height + peaks.err_height)
         # A less accurate maximum may be higher.
         err = np.maximum(peaks.err_height[chosen], ceiling[has] - peaks.height[chosen])
-        located, rounded, off = self.locate or request.place, self.family.precise_poses is None, np.zeros(rows.size)
+        located, rounded, off = self.locate or request.place, rounding.plain(self.family), np.zeros(rows.size)
         if (located or rounded) and chosen.size:
-            off[has] = rounding.shaken(self.family, self.designs[rows[has]], peaks.phi[chosen], request.pose)
+            given = self.family.precise() if rounded else self.family
+            off[has] = rounding.shaken(given, self.designs[rows[has]], peaks.phi[chosen], request.pose)
         if rounded and chosen.size:
             # Badly scaled designs lose digits before any discriminant is computed.
-            err = np.maximum(err, off[has])
+            err = np.maximum(err, rounding.CANCELLED * off[has])
             if self.near is not None:
                 err += np.where(
                     only(self.near, rows[has]).distance(peaks.phi[chosen]) < CLOSE, refine.VARIES * off[has], 0.0

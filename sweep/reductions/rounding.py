@@ -20,6 +20,7 @@ from sweep.reductions.sampling import blocks, pose_columns
 
 TRIES = 3
 PLACES = 32  # a force along what bears none is exactly 0 at five of six poses
+CANCELLED = 2.0  # error of a pose per change by rounded inputs, at most: changes by several inputs may cancel
 BETWEEN = 0.618  # share of their spacing by which they stand off a pose, so that no even share of a turn meets a jump
 ALONE = 0.1  # relative change of a curve's highest sample by rounded inputs from which on the curve is only rounding
 FAINT = 1e-10  # ratio of range to size below which the rounding of a signed curve is checked
@@ -157,6 +158,11 @@ def rounding_alone(family: Family, designs: Array, pose: str, values: Array, sca
         off = shaken_anywhere(family, designs[which], top * (TWO_PI / values.shape[1]), pose)
         found[which] = off >= ALONE * scale[which]
     return found
+
+
+def plain(family: Family) -> bool:
+    """Whether a family, or a stage of a chain, has no more precise poses than those with the rounding of float64."""
+    return any(stage.family.precise_poses is None for stage in family.stages)
 
 
 def order_of(family: Family, pose: str) -> int:
