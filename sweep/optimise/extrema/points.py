@@ -307,6 +307,12 @@ class Curves:
             points.level[[low, high]] = 0.0, 1.0
         s, x = (np.unwrap(columns[c.output][0]) if c.wrapped else columns[c.output][0] for c in (position, series))
         share = (s - points.value[low]) / (points.value[high] - points.value[low])
+        if series.output == position.output:
+            # A dip of one sample has two edges too close for Newton's method; its own row keeps it inside.
+            inside = (share >= series.window[0]) & (share <= series.window[1])
+            gap = ~inside & np.roll(inside, 1) & np.roll(inside, -1)
+            gap &= scanned.distances(points.phi[[low, high]], phi) > phi[1] - phi[0]
+            share[gap] = 0.5 * (np.roll(share, 1) + np.roll(share, -1))[gap]
         rows = []
         for edge in series.window:
             if edge in (0.0, 1.0):
