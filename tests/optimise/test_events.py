@@ -76,6 +76,24 @@ def test_slopes_of_the_angle_in_a_window_are_exact(
         assert rows.loc[name, "growing"] == pytest.approx(slope, rel=1e-6, abs=1e-8), name
 
 
+def test_a_dip_narrower_than_the_samples_is_no_feasible_rest() -> None:
+    # Its two edges, 0.0016 rad apart around one of 256 samples, once merged into one: the rest of 1.39 rad was 1.76.
+    links = {"a1": 5.00476917879443, "b1": 38.29477135152248, "c1": 15.597207723578443, "a2": 47.68539618599832}
+    changed = SIX_BAR | links | {"b2": 20.00000894069676, "offset2": 5.327040728397252}
+    full, free = family(["rssr", "slider_crank"]), ("a1", "b1")
+    design = np.array([changed.get(p.name, p.default) for p in full.parameters], np.float64)
+    low, limit = np.array([4.0, 30.0]), Limit("window_angle", math.radians(80.0), None)
+    problem = Problem(full, free, low, low + 10.0, changed, "max_abs_d2s", (limit,), (0.99, 1.0))
+    program = Program(problem)
+    start = Model(problem, program, design, lambda: False)
+    state = start.state(problem.scaled(design[None, :])[0])
+    measured = program.value(program.requirements[-1].measure, state.form, start.curves, design, state.atoms)
+    true = sweep.summarise(full, changed, ["window_angle"], accuracy=1e-12, window=(0.99, 1.0)).window_angle[0]
+    # What the dip takes is no part of the measured angle, but its row is violated.
+    assert true == pytest.approx(1.39469, abs=1e-5) and measured == pytest.approx(true + 0.00157, abs=1e-5)
+    assert not state.feasible and state.violation < 1e-4
+
+
 def model(limit: Limit) -> Model:
     free = ("looper.a", "looper.x_at")
     place = DESIGN[[NAMES.index(name) for name in free]]
