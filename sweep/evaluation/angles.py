@@ -145,12 +145,9 @@ def _check_plausible(name: str, values: Any, turns_on: bool) -> None:
     if is_plausible(float(np.max(sizes, initial=0.0, where=np.isfinite(sizes))), turns_on):
         return
     row = int(np.argmax(np.where(np.isfinite(sizes), sizes, 0.0)))
-    raise InputError(
-        name,
-        float(np.atleast_1d(numbers(values, "angle", "column")).flat[row]),
-        f"{'rad, which this does not look like' if turns_on else 'at most 2 pi, in rad'}; " + REMEDY.format(name=name),
-        f"{'' if turns_on else 'column '}{name}, row {row}",
-    )
+    value = float(np.atleast_1d(numbers(values, "angle", "column")).flat[row])
+    allowed, column = ("rad, which this does not look like", "") if turns_on else ("at most 2 pi, in rad", "column ")
+    raise InputError(name, value, f"{allowed}; {REMEDY.format(name=name)}", f"{column}{name}, row {row}")
 
 
 def is_plausible(largest: float, turns_on: bool) -> bool:

@@ -34,12 +34,8 @@ def curves_of(family: Family, loads: Loads | None) -> dict[str, Curve]:
     inputs = curved_inputs(family) if loads else ()
     for name, curve in (loads or {}).items():
         if name not in inputs:
-            raise InputError(
-                "loads",
-                name,
-                f"{', '.join(inputs) or 'no load: no effect takes one'}{nearest(name, inputs)}",
-                family.name,
-            )
+            allowed = f"{', '.join(inputs) or 'no load: no effect takes one'}{nearest(name, inputs)}"
+            raise InputError("loads", name, allowed, family.name)
         curves[name] = _curve(name, curve)
     return curves
 

@@ -214,9 +214,8 @@ def inertial(design: Mapping[str, float], name: str, stage: str, unit: str, leng
         raise InputError(f"j_{name}_xx{stage}", f"least moment {low:.3g}", allowed, "export")
     if high > (low + middle) * (1.0 + 1e-9):
         allowed = "moments of which none exceeds the sum of the others, as of any body"
-        raise InputError(
-            f"j_{name}_xx{stage}", f"principal moments {low:.3g}, {middle:.3g}, {high:.3g}", allowed, "export"
-        )
+        moments = f"principal moments {low:.3g}, {middle:.3g}, {high:.3g}"
+        raise InputError(f"j_{name}_xx{stage}", moments, allowed, "export")
     scale = kilograms * metres**2
     tensor = np.array([xx, yy, zz, xy, xz, yz]) * scale
     return {"mass": mass * kilograms, "centre": centre * metres, "tensor": tensor}

@@ -34,9 +34,8 @@ def turn(mechanism: Mechanism, design: Table, phi: float, poses: int) -> list[Pa
     domain = find_family(mechanism).domain
     for part in stages:
         if not part.links:
-            raise InputError(
-                "mechanism", part.family.name, "a mechanism whose links are known: see docs/frames.md", "export"
-            )
+            allowed = "a mechanism whose links are known: see docs/frames.md"
+            raise InputError("mechanism", part.family.name, allowed, "export")
         bad = np.flatnonzero([not np.isfinite(path).all(axis=1).all() for path in part.joints.values()])
         if bad.size:
             pose = int(np.argmax(part.status != 0))

@@ -24,11 +24,6 @@ def basis() -> tuple[Array, Array]:
     return nodes, both * np.cos(np.pi * np.outer(order, order[::-1]) / (NODES - 1))
 
 
-def at_nodes(series: Array) -> Array:
-    """Values (k, NODES) at the nodes of polynomials with coefficients (k, NODES)."""
-    return product(series, rising(basis()[0]))
-
-
 def rising(x: Array) -> Array:
     """Evaluate the Chebyshev polynomials at x (m,), lowest order first, (NODES, m)."""
     return np.asarray(chebyshev.chebvander(x, NODES - 1).T, np.float64)

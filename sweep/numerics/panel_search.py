@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 
 from kernels.curves import samples as scan
 from kernels.types import EPS, TWO_PI, Array
-from sweep.numerics.chebyshev import DENSE, NODES, at_nodes, basis, product, rising, summits
+from sweep.numerics.chebyshev import DENSE, NODES, basis, product, rising, summits
 from sweep.numerics.records import Indices, joined, only
 
 PANELS = 64  # first even panels of a turn, besides cuts where a curve may bend
@@ -80,7 +80,7 @@ def climbed(curves: CurveValues, panels: Panels, n: int, mode: int, target: floa
     aim = min(target, PLACED) if locate else target
     best, least = np.full(n, -np.inf), np.full(n, np.inf)
     np.maximum.at(best, panels.row, panels.peak)
-    np.minimum.at(least, panels.row, measured(at_nodes(panels.series), mode).min(axis=1))
+    np.minimum.at(least, panels.row, measured(product(panels.series, rising(basis()[0])), mode).min(axis=1))
     size = best if mode == 0 else best - least
     tops = [_given_up(only(panels, panels.row < 0), mode)]  # none: there may be no panel at all
     while panels.row.size:

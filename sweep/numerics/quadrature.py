@@ -57,13 +57,12 @@ SMALL = 1e-4  # largest error, as a share of the integral, that is taken for noi
 class Integrals(NamedTuple):
     """Integrals of n curves and their error estimates, each (n, q), and (n,) whether the target is met.
 
-    ``seen`` marks the curves whose values were all finite; the integrals of the others are nan.
+    The integrals of a curve whose values are not all finite are nan.
     """
 
     value: Array
     err: Array
     settled: Mask
-    seen: Mask
 
 
 class _Panels(NamedTuple):
@@ -126,12 +125,10 @@ def integrate(function: Integrand, edges: Array, target: float) -> Integrals:
             break
         count += np.bincount(panels.row, minlength=n)
         panels = _halved(function, panels)
-    else:
-        np.add.at(done, panels.row, panels.value)
-        np.add.at(done_err, panels.row, panels.err)
-    return Integrals(
-        np.where(seen[:, None], done, np.nan), np.where(seen[:, None], done_err, np.nan), settled & seen, seen
-    )
+    np.add.at(done, panels.row, panels.value)  # panels that all passes have halved
+    np.add.at(done_err, panels.row, panels.err)
+    done[~seen], done_err[~seen] = np.nan, np.nan
+    return Integrals(done, done_err, settled & seen)
 
 
 def _halved(function: Integrand, panels: _Panels) -> _Panels:

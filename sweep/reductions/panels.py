@@ -122,13 +122,15 @@ def _block(
             if any(len(known.parts) > 1 and known.of == request.pose for known in family.every(Smooth)):
                 # A magnitude is not below 0, however steep the zero that it passes.
                 np.minimum(top.err, -top.value, out=top.err, where=top.value <= 0.0)
-        if family.pose_output[request.pose].jumps:  # piecewise constant: a polynomial only adds rounding
+        jumps = family.pose_output[request.pose].jumps
+        if jumps:  # piecewise constant: a polynomial only adds rounding
             beside = top.phi[:, None] + NARROWEST * np.array([-1.0, 0.0, 1.0])  # it may jump at the place itself
             near_by, _ = sampling.pose_columns(family, designs[rows[top.row]], beside, [request.pose])
             heights = measured(near_by[request.pose], request.mode)
             side = np.abs(heights - top.value[:, None]).argmin(axis=1)
             top = top._replace(value=np.take_along_axis(heights, side[:, None], axis=1)[:, 0])
-        late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding)))
+        # A count may flicker where rounding decides: it is as a pose has it, and its error says what no pose excludes.
+        late = np.flatnonzero(lost | ((top.err > allowed) & (top.err > rounding) & (not jumps)))
         off = shaken_anywhere(family, designs[rows[top.row[late]]], top.phi[late], request.pose)
         noise = off >= ALONE * size[top.row[late]]
         top.err[late[noise]] = np.maximum(top.err[late], off)[noise]

@@ -174,11 +174,10 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
     places = place_names(family)
     known = ", ".join(name for name in names if name not in places) or "none"
     allowed = f"a proof of the maxima that have one; of {family.name}: {known}"
+    where = f"design outputs of {family.name}"
     for name in accuracy.proven:
         if name not in names or name not in wanted:
-            raise InputError(
-                "certify", name, f"{allowed}, as far as they are wanted", f"design outputs of {family.name}"
-            )
+            raise InputError("certify", name, f"{allowed}, as far as they are wanted", where)
     for name in accuracy.proven or wanted:
         found = resolve(family, name)  # unknown names end here
         if not isinstance(found, Reduced) or not found.extreme:
@@ -186,11 +185,9 @@ def check_certifiable(family: Family, wanted: Sequence[str], accuracy: Accuracy,
         cut = windowed and is_windowed(family, found)
         if cut or applying_step(family, name, accuracy) is None:
             why = f"{name} in a window" if cut else name
-            raise InputError(
-                "certify", True, f"{allowed}; not of {why}: name those to prove", f"design outputs of {family.name}"
-            )
+            raise InputError("certify", True, f"{allowed}; not of {why}: name those to prove", where)
     if not set(names) & set(wanted):
-        raise InputError("certify", True, f"{allowed}; none of them is wanted", f"design outputs of {family.name}")
+        raise InputError("certify", True, f"{allowed}; none of them is wanted", where)
 
 
 # Poses per design on average: for a margin, a mean, an event, a search without its peaks, a refined extremum.

@@ -16,6 +16,7 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import family
 from sweep.families.base import Accuracy, Angles
 from sweep.reductions.peak_search import LIMIT, PeakSearch
+from tests.effects.test_balance import FRICTION, RSSR_LOADS
 from tests.support.optimise_family import FAMILY as WAVES
 
 DENSE = 100_000
@@ -153,6 +154,19 @@ def test_a_count_that_is_least_up_to_a_jump_is_that_of_its_own_side():
         assert found["max_contact"].tolist() == ends["max"].tolist()
         assert found["min_contact"].tolist() == ends["min"].tolist()
         assert (found["range_contact"] == ends["max"].to_numpy() - ends["min"].to_numpy()).all()
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-9])
+def test_a_count_that_flickers_where_rounding_decides_is_whole_and_says_how_far_it_may_be_off(accuracy):
+    """Passes of the friction iteration change by one from pose to pose: every design was NOT_CONVERGED for them."""
+    names = ["max_friction_passes", "min_friction_passes", "range_friction_passes"]
+    found = sweep.summarise("rssr", RSSR_LOADS | FRICTION, names, accuracy=accuracy).iloc[0]
+    turn = np.linspace(0.0, 2.0 * np.pi, 20001)
+    dense = sweep.evaluate("rssr", RSSR_LOADS | FRICTION, ["friction_passes"], phi=turn)["friction_passes"]
+    assert found.status == st.OK
+    for name, value in zip(names, (dense.max(), dense.min(), np.ptp(dense)), strict=True):
+        assert found[name] == round(found[name])
+        assert abs(found[name] - value) <= found[f"err_{name}"]
 
 
 def test_an_angle_that_all_but_jumps_over_its_cut_is_not_called_a_turn():

@@ -180,9 +180,8 @@ def _member(
     ratio = turns(table, where) if mount is None else mount.ratio
     offset = number("offset", table.get("offset", 0.0), where, "an angle in rad")
     if reads_as_degrees(offset):
-        raise InputError(
-            "offset", offset, "an angle in rad, which this does not look like; math.radians makes it one", where
-        )
+        allowed = "an angle in rad, which this does not look like; math.radians makes it one"
+        raise InputError("offset", offset, allowed, where)
     tip = None if table.get("tip") is None else vector(table["tip"], f"{where}.tip")
     if tip is not None and family.find(OutputLink) is None:
         raise InputError("tip", tip, f"a member whose output link turns; {family.name} has none", where)
