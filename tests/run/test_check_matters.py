@@ -27,7 +27,7 @@ def lines_of(study):
 
 def number(lines, effect):
     (line,) = [line for line in lines if line.strip().startswith(f"{effect}:")]
-    return float(re.search(r" ([\d.e+-]+), (?:not )?below", line)[1])
+    return float(re.search(r" ([\d.e+-]+)(?: rad)?, (?:not )?below", line)[1])
 
 
 def test_designs_that_are_looked_at_keep_all_limits() -> None:
