@@ -7,6 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
+from kernels.curves.samples import LEVEL_SLOPE
 from kernels.types import TWO_PI, Array
 from sweep.numerics.records import Indices, Mask
 
@@ -16,7 +17,6 @@ BISECTIONS = 120  # at most; a smooth function takes some eight steps, a jump on
 GRID, GRIDS = 9, 26  # points of each grid about a minimum; grids that narrow a whole turn down to rounding
 LAST = 2.0**-48  # width of the last brackets [rad]: four times the rounding of an angle
 SAME = 1e-9  # distance [rad] of a root from a jump below which it counts as the jump
-STILL = 1e-3  # change in a step, relative to the bend, from which on a curve at 0 does not just touch it
 FLAT = 1e-9  # width of brackets [rad] in which a smooth function is at its minimum to rounding
 
 Functions: TypeAlias = Callable[[Indices, Array], Array]
@@ -37,7 +37,7 @@ def passages(off: Array, wraps: bool) -> Mask:
     """
     before, after, second, third = (np.roll(off, -k, axis=1) for k in (-1, 1, 2, 3))
     slope = np.abs(8.0 * (second - off) - (third - before))
-    touches = (after == 0.0) & (second < 0.0) & (slope <= 12.0 * STILL * np.abs(off + second))
+    touches = (after == 0.0) & (second < 0.0) & (slope <= 12.0 * LEVEL_SLOPE * np.abs(off + second))
     passes: Mask = (off < 0.0) & (after >= 0.0) & ~touches
     return passes & (after - off < np.pi) if wraps else passes
 
