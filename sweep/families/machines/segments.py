@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -47,29 +48,41 @@ def closest(p1: Point, q1: Point, p2: Point, q2: Point) -> Closest:
 
     It is the minimum of a convex function over a square: at one of four ends against the other segment, or inside both.
     Each candidate is the length of an actual difference, so none is too small; parallel segments need no threshold.
+    The place inside is reckoned from the nearest end: the difference is short there, and its products keep their digits
+    where the segments are nearly parallel.
     """
     d1, d2, w = minus(q1, p1), minus(q2, p2), minus(p2, p1)
-    n = cross(d1, d2)
+
+    def apart(s: Any, t: Any) -> list[Any]:
+        return [x + t * b - s * a for x, a, b in zip(w, d1, d2, strict=True)]
+
+    def at(s: Any, t: Any) -> Closest:
+        off = apart(s, t)
+        return Closest(np.sqrt(dot(off, off)), s, t)
+
+    zero = 0.0 * dot(w, w)
+    nearest_end = reduce(
+        _nearer,
+        (
+            at(zero, _foot(minus(p1, p2), d2)),
+            at(zero + 1.0, _foot(minus(q1, p2), d2)),
+            at(_foot(w, d1), zero),
+            at(_foot(minus(q2, p1), d1), zero + 1.0),
+        ),
+    )
+    _, s, t = nearest_end
+    off, n = apart(s, t), cross(d1, d2)
     square = dot(n, n)
     crossed = np.real(square) > 0.0
     size = np.where(crossed, square, 1.0)
-    s, t = dot(cross(w, d2), n) / size, dot(cross(w, d1), n) / size
+    s, t = s + dot(cross(off, d2), n) / size, t + dot(cross(off, d1), n) / size
     inside = crossed & _within(s) & _within(t)
-    zero = 0.0 * s
-    candidates = [
-        (zero, _foot(minus(p1, p2), d2)),
-        (zero + 1.0, _foot(minus(q1, p2), d2)),
-        (_foot(w, d1), zero),
-        (_foot(minus(q2, p1), d1), zero + 1.0),
-        (np.where(inside, s, 0.0), np.where(inside, t, 0.0)),
-    ]
-    best: Any = None
-    for along, across in candidates:
-        apart = [x + across * b - along * a for x, a, b in zip(w, d1, d2, strict=True)]
-        found = dot(apart, apart), along, across
-        nearer = None if best is None else np.real(found[0]) < np.real(best[0])
-        best = found if nearer is None else tuple(np.where(nearer, a, b) for a, b in zip(found, best, strict=True))
-    return Closest(np.sqrt(best[0]), best[1], best[2])
+    return _nearer(nearest_end, at(np.where(inside, s, 0.0), np.where(inside, t, 0.0)))
+
+
+def _nearer(one: Closest, other: Closest) -> Closest:
+    closer = np.real(other.distance) < np.real(one.distance)
+    return Closest(*(np.where(closer, b, a) for a, b in zip(one, other, strict=True)))
 
 
 def triple_product(p1: Point, q1: Point, p2: Point, q2: Point) -> Any:

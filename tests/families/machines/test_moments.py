@@ -77,6 +77,18 @@ def test_distances_of_segments_are_those_of_the_table():
     assert worst and max(worst.values()) < FACTOR, worst
 
 
+@pytest.mark.parametrize("angle", [1e-3, 1e-6, 1e-8, 1e-10])
+def test_segments_that_cross_at_a_hairs_angle_are_no_distance_apart(angle):
+    """They meet but for the rounding of their ends; at 1e-8 rad they were found 1e-7 apart."""
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        meet, d1, across = 50.0 * rng.normal(size=3), 30.0 * rng.normal(size=3), 30.0 * rng.normal(size=3)
+        d2 = rng.uniform(0.5, 2.0) * d1 + angle * across
+        s, t = rng.uniform(0.2, 0.8, 2)
+        found = closest(meet - s * d1, meet + (1.0 - s) * d1, meet - t * d2, meet + (1.0 - t) * d2)
+        assert found.distance <= FACTOR * 2.0**-53 * 100.0
+
+
 @pytest.mark.parametrize("case", sorted({row["case"] for row in rows_of("moment_A")}))
 def test_the_moment_a_is_that_of_the_table(case):
     worst = {}
