@@ -168,6 +168,14 @@ def _on_the_other(path: Array, foot: Foot, state: State, j: int, low: float, hig
     return _root(path, foot, state, j, low, high, 2) if _measure(low, path, foot, state, j, 2) > 0.0 else 2.0
 
 
+@inline
+def _thrown_just_before(path: Array, foot: Foot, state: State, j: int, s: float) -> bool:
+    """Whether the foot left at most two parts of a cell ago a rack that still draws away: it cannot have landed."""
+    y, _, bend = rack_height(path, j, s)
+    young = j + s - state.since * (path.shape[1] / TWO_PI) < 2.0 / _PARTS
+    return young and state.clear == state.since and y > 0.0 and held(foot, y, bend) < 0.0
+
+
 @kernel
 def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tuple[float, int]:
     """Find the share of the cell at which the state ends, and the measure; 2 and -1 if it lasts beyond the cell."""
@@ -197,7 +205,7 @@ def _next_event(path: Array, foot: Foot, state: State, j: int, s: float) -> tupl
                     first, which = level, 0
             if which >= 0:
                 return first, which
-        elif _measure(after, path, foot, state, j, 2) < 0.0:
+        elif _measure(after, path, foot, state, j, 2) < 0.0 and not _thrown_just_before(path, foot, state, j, after):
             # A flight begins without a gap: halve towards its begin until there is one.  Where none is found, a rebound
             # ends at its highest point, a launch at the end of this part.
             clear = before

@@ -11,7 +11,7 @@ from kernels.effects.foot import OUTPUTS as _EVENTS
 from kernels.effects.foot_fabric import march
 from kernels.families import foot
 from kernels.status import NO_EVENT, OK
-from kernels.types import Array
+from kernels.types import TWO_PI, Array
 from sweep.families import feed
 from sweep.families.base import (
     Accuracy,
@@ -30,6 +30,8 @@ from sweep.families.capabilities import Fixed, Link, MovingPoint, PresserFoot, S
 from sweep.families.poses import chosen, equal_steps, guarded
 from sweep.families.skeletons import Y as UPWARDS
 from sweep.families.skeletons import moving, standing
+from sweep.numerics.events import FLAT, bottoms, zeros
+from sweep.numerics.records import Indices
 
 PARAMETERS = parameters_of("foot")
 
@@ -75,6 +77,7 @@ TURNS = 4
 NODES = 720
 CHANGES = 128  # changes of contact in a turn that are recorded: bounces with a restitution of 0.7 need as many
 FEET = [0, 1, 2, 3, 6, 8, 9]  # columns of the march's inputs
+NEXT_TO_PLATE = 1e-7  # share of the rack's rise below which rounding of a force over the height is no spring
 
 
 def marched(path: Array, feet: Array) -> tuple[Columns, Array, Array]:
@@ -226,26 +229,35 @@ def on_feed(designs: Array, nodes: int, sense: int = 1) -> Marched:
 
 
 def contact(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
-    """Compute the softest spring and least preload that keep a rigid foot on the rack from entry to leaving."""
-    mass, _, preload, omega = designs[:, _FEET[:4]].T
-    unit = mass * omega * omega
+    """Compute the softest spring and least preload that keep a rigid foot on the rack all the time above the plate."""
+    mass, _, preload, omega = designs[:, _FEET[:4], None].transpose(1, 0, 2)
+    unit, rack = mass * omega * omega, np.ascontiguousarray(designs[:, :_RACK_COLUMNS])
+    phi = TWO_PI / NODES * np.arange(-1.0, NODES + 1.0)
     path, status = feed_path(designs, NODES)
-    rack = np.ascontiguousarray(designs[:, :_RACK_COLUMNS])
-    ends = feed.events(rack, frozenset(("phi_entry", "phi_leave")), accuracy)
-    places = np.stack(floats(ends, "phi_entry", "phi_leave"), axis=1)
-    known = np.asarray(np.isfinite(places).all(axis=1))
-    bend = feed.poses(rack, Angles.of(np.where(known[:, None], places, 0.0)), frozenset(("d2y_t",)))["d2y_t"]
-    least = np.where(known, unit * np.maximum(-np.asarray(bend, np.float64).min(axis=1), 0.0), np.nan)
-    height, rising = path[:, 0], path[:, 0] > 0.0
-    with np.errstate(all="ignore"):
-        springs = np.where(rising, (-unit[:, None] * path[:, 2] - preload[:, None]) / height, -np.inf)
-        # at every node the top of the parabola through it and its neighbours; nan next to the plate
-        before, after = np.roll(springs, 1, axis=1), np.roll(springs, -1, axis=1)
-        tops = springs - (after - before) ** 2 / (8.0 * (before - 2.0 * springs + after))
-        # of nearly equal tops the higher one may lie between lower nodes
-        tops = np.where((springs >= before) & (springs >= after), np.fmax(springs, tops), -np.inf)
-    softest = np.where(known & (preload >= least), np.maximum(tops.max(axis=1), 0.0), np.nan)
-    return happening({"k_min_contact": softest, "F0_min_contact": least, "status": status}, wanted)
+    lowest = NEXT_TO_PLATE * path[:, 0].max(axis=1, keepdims=True)
+
+    def springs(rows: Indices, height: Array, bend: Array) -> Array:
+        with np.errstate(all="ignore"):
+            needed = (-unit[rows] * bend - preload[rows]) / height
+        return np.where(height > lowest[rows], needed, -np.inf)
+
+    def look(rows: Indices, phi: Array) -> tuple[Array, Array]:
+        y, bend = feed.FAMILY.values(rack[rows], Angles.of(phi), "y_t", "d2y_t")
+        return y - rack[rows, _PLATE, None], bend
+
+    above = (path[:, 0] > 0.0) & (status == OK)[:, None]
+    nodes = springs(np.arange(len(designs)), path[:, 0], path[:, 2])
+    row, column = np.nonzero(above != np.roll(above, -1, axis=1))
+    passed = zeros(lambda k, at: look(row[k], at[:, None])[0][:, 0], phi[column + 1], phi[column + 2])
+    least, softest = np.full((len(designs), 1), np.nan), np.zeros((len(designs), 1))
+    least[row] = 0.0
+    np.maximum.at(least, row, -unit[row] * look(row, passed[:, None])[1])
+    # of nearly equal tops the higher one may lie between lower nodes
+    row, column = np.nonzero(above & (nodes >= np.roll(nodes, 1, axis=1)) & (nodes >= np.roll(nodes, -1, axis=1)))
+    top = bottoms(lambda at: -springs(row, *look(row, at)), phi[column], phi[column + 2], FLAT)
+    np.maximum.at(softest, row, springs(row, *look(row, top[:, None])))
+    softest[~(preload >= least)] = np.nan
+    return happening({"k_min_contact": softest[:, 0], "F0_min_contact": least[:, 0], "status": status}, wanted)
 
 
 def feeding(designs: Array, wanted: frozenset[str], accuracy: Accuracy) -> Columns:
@@ -282,7 +294,8 @@ def feed_foot_place(designs: Array, angles: Angles, found: Columns) -> Array:
 CONTACT_OUTPUTS = (
     Output("k_min_contact", "force/length", "softest spring that keeps contact with this preload, rigid ground; nan if "
            "none does, for want of preload", "(3)"),
-    Output("F0_min_contact", "N", "least preload that keeps contact at entry and leaving, rigid ground", "(3)"),
+    Output("F0_min_contact", "N", "least preload that keeps contact at every passage of the plate, rigid ground",
+           "(3)"),
 )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from mpmath import mp, mpf
+from scipy.optimize import brentq
 
 import sweep
 from kernels import status as st
@@ -107,6 +108,24 @@ def test_foot_whose_first_flight_ends_in_the_next_turn_lands_there(restitution):
     # both find the same events by halving; three turns of flights feed rounding back
     assert got.phi_loss == pytest.approx(first[0] % (2.0 * math.pi), abs=1e-9)
     assert got.phi_land == pytest.approx(first[1] % (2.0 * math.pi), abs=1e-9)
+
+
+@pytest.mark.parametrize("before", [1e-7, 1e-6, 1e-5])
+def test_foot_thrown_off_just_before_a_part_of_a_cell_ends_flies_on(before):
+    """The gap there is below rounding: it landed at once, up to 18 times (3 of 330 random feet that fly)."""
+    loss, k, p = 462.0 * (math.pi / 1440.0) - before, 0.5, 0.5
+    preload = (1.0 - k) * math.sin(loss) + k * p
+    rest, root = -preload / k, math.sqrt(k)
+
+    def gap(phi):
+        t = root * (phi - loss)
+        free = rest + (math.sin(loss) - p - rest) * math.cos(t) + math.cos(loss) / root * math.sin(t)
+        return free - max(math.sin(phi) - p, 0.0)
+
+    foot = {"m": 1.0, "k": k, "F0": preload, "omega": 1.0, "Y": 1.0, "p": p}
+    got = sweep.summarise("foot", foot, ["flights", "phi_loss", "phi_land"]).iloc[0]
+    assert got.flights == 1.0 and got.phi_loss == pytest.approx(loss, abs=1e-9)
+    assert got.phi_land == pytest.approx(brentq(gap, loss + 0.1, 4.0), abs=1e-9)
 
 
 def test_foot_first_landing_of_the_march_is_the_time_of_the_closed_form():
