@@ -19,7 +19,7 @@ from sweep.families.poses import differentiable
 from sweep.numerics.records import Indices
 from sweep.optimise.extrema import scanned
 from sweep.optimise.problem.statement import Problem
-from sweep.quantities.measures import Series, curve
+from sweep.quantities.measures import Series, curve, measure
 from sweep.reductions.sampling import on_closed_turn
 
 STEP = 1e-30  # imaginary step: the error is of order STEP^2, without cancellation
@@ -33,10 +33,11 @@ class Points:
     """K points of a design's curves; every array is (K,).
 
     ``series`` is the number of the curve, ``phi`` the crank angle, ``sense`` +1 for a maximum and -1 for a minimum.
-    ``kind`` is the condition that defines the point: stationary, the crossing of the window's edge at the fraction
-    ``level`` of the stroke, a fixed angle, an edge of the curve (``level`` gives its number and side), or the angle at
-    which the curve passes ``level``, upwards for ``sense`` +1.  ``value`` is the curve there, ``slope`` and
-    ``curvature`` are its derivatives by phi; ``position_slope`` is the slope of the position.
+    ``kind`` is the condition that defines the point: stationary (in a window ``level`` is the edge that an extremum of
+    the position faces), the crossing of the window's edge at the fraction ``level`` of the stroke, a fixed angle, an
+    edge of the curve (``level`` gives its number and side), or the angle at which the curve passes ``level``, upwards
+    for ``sense`` +1.  ``value`` is the curve there, ``slope`` and ``curvature`` are its derivatives by phi;
+    ``position_slope`` is the slope of the position.
     """
 
     series: Indices
@@ -90,6 +91,9 @@ class Curves:
         numbers = {s: n for n, s in enumerate(series) if s in followers}
         numbers |= {s: numbers[p] for s, p in zip((s for s in series if s.window is not None), followers, strict=True)}
         self.position: Indices = np.array([numbers.get(s, -1) for s in series], np.intp)
+        names = [problem.objective, *(limit.output for limit in problem.limits if limit.maximum is not None)]
+        measures = [measure(problem.family, name, problem.window) for name in names]
+        self.kept_out = [m.series[0] for m in measures if m.kind == "stay"]
         self.wanted = frozenset(s.output for s in series)
         self.with_angles = with_angles
         self.plain = tuple(s.output for s in series if _is_plain(s))
@@ -307,10 +311,12 @@ class Curves:
             points.level[[low, high]] = 0.0, 1.0
         s, x = (np.unwrap(columns[c.output][0]) if c.wrapped else columns[c.output][0] for c in (position, series))
         share = (s - points.value[low]) / (points.value[high] - points.value[low])
-        if series.output == position.output:
-            # A dip of one sample has two edges too close for Newton's method; its own row keeps it inside.
+        own = series.output == position.output
+        if own:
+            # A dip of one sample has two edges too close for Newton's method; its own row keeps it on its side.
             inside = (share >= series.window[0]) & (share <= series.window[1])
-            gap = ~inside & np.roll(inside, 1) & np.roll(inside, -1)
+            gap = (inside != np.roll(inside, 1)) & (inside != np.roll(inside, -1))
+            gap &= ~inside | (series in self.kept_out)
             gap &= scanned.distances(points.phi[[low, high]], phi) > phi[1] - phi[0]
             share[gap] = 0.5 * (np.roll(share, 1) + np.roll(share, -1))[gap]
         rows = []
@@ -323,8 +329,13 @@ class Curves:
                 start = phi[j] + weight * (phi[1] - phi[0])
                 rows += [(n, start, sense, scanned.CROSSING, edge, x[j]) for sense in (1.0, -1.0)]
         inside = (share >= series.window[0] - 1e-12) & (share <= series.window[1] + 1e-12)
+        margin = self._margin(n, design[None, :], phi)[0]
         for sense in (1.0, -1.0):
-            rows += scanned.extrema(n, phi, x + sense * self._margin(n, design[None, :], phi)[0], False, sense, inside)
+            opposite, edge = series.window if sense > 0.0 else series.window[::-1]
+            rows += scanned.extrema(n, phi, x + sense * margin, False, sense, inside, edge)
+            if own:
+                outside = ~inside & (sense * (opposite - share) > 0.0)
+                rows += scanned.extrema(n, phi, x, False, sense, outside, opposite)
         return rows
 
 

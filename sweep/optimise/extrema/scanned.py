@@ -24,8 +24,10 @@ STATIONARY, CROSSING, STATIC, PASSING, EDGE = range(5)
 PointRow: TypeAlias = tuple[int, float, float, int, float, float]
 
 
-def extrema(n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: Mask | None = None) -> list[PointRow]:
-    """Return the maxima (sense +1) or minima (-1) of a curve."""
+def extrema(
+    n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: Mask | None = None, level: float = math.nan
+) -> list[PointRow]:
+    """Return the maxima (sense +1) or minima (-1) of a curve; the ``level`` of these points is as given."""
     if not np.isfinite(x).all():
         return []
     if wrapped:
@@ -37,13 +39,13 @@ def extrema(n: int, phi: Array, x: Array, wrapped: bool, sense: float, inside: M
         return []
     top, bottom = float(x[eligible].max()), float(x[eligible].min())
     if top - bottom <= 1e-13 * max(abs(top), abs(bottom)):
-        return [(n, float(phi[0]), sense, STATIC, math.nan, float(x[0]))]
+        return [(n, float(phi[0]), sense, STATIC, level, float(x[0]))]
     before, after, middle = np.roll(x, 1), np.roll(x, -1), 0.5 * (top + bottom)
     peak = eligible & (sense * x > sense * before) & (sense * x >= sense * after)
     if inside is None:
         # All extrema inside a window count: a refused step cannot add the extrema of its design.
         peak &= sense * (x - middle) >= 0.0
-    return [(n, float(phi[j]), sense, STATIONARY, math.nan, float(x[j])) for j in np.flatnonzero(peak)]
+    return [(n, float(phi[j]), sense, STATIONARY, level, float(x[j])) for j in np.flatnonzero(peak)]
 
 
 def edge_extrema(n: int, phi: Array, edge: Array, values: Array, curve: Array) -> list[PointRow]:

@@ -99,7 +99,7 @@ class Program:
         complete = turns
         for requirement in self.requirements:
             complete = layout.require(requirement) and complete
-        layout.keep_inside(self.objective)
+        layout.keep_sides(self.objective, None, True, "minimum")
         sums = layout.upper(self.objective)
         for term, shift in sums:
             layout.add(term, shift, -1.0 / scale, 0.0, 1.0, False, Label(self.objective.name, "objective"))
@@ -152,8 +152,9 @@ class _Layout:
         """Add the rows of one limit; return False if the design has no extremum of the limited output."""
         exists = True
         self._exclude_earlier_passages(r, "minimum" if r.maximum is None else "maximum")
-        if r.measure.kind == "minus" or r.minimum is not None:
-            self.keep_inside(r.measure, r.minimum, "equal" if r.equal else "minimum")
+        for bound, above in ((r.minimum, False), (r.maximum, True)):
+            if bound is not None:
+                self.keep_sides(r.measure, bound, above, "equal" if r.equal else "maximum" if above else "minimum")
         sides = [("minimum", r.minimum, 1.0, r.lower_shift), ("maximum", r.maximum, -1.0, r.upper_shift)]
         for side, bound, sense, change in [("equal", r.minimum, 1.0, NO_SHIFT)] if r.equal else sides:
             if bound is None:
@@ -282,11 +283,12 @@ class _Layout:
         tops, bottoms = self._extrema([self.curves.series[self.curves.position[n]]])
         return None if low < 0 else Stay(self.points, n, m.series[0].window or (0.0, 1.0), (low, high), bottoms, tops)
 
-    def keep_inside(self, m: Measure, least: float | None = None, side: str = "minimum") -> None:
-        """Keep the tops and dips of a window inside it, as far as its angle, or the ``least`` one, needs them."""
-        m, least = (m.parts[0], None) if m.kind == "minus" else (m, least)
+    def keep_sides(self, m: Measure, bound: float | None, above: bool, side: str) -> None:
+        """Keep tops and dips on their sides of a window's edges, as far as a bound of its angle, or the least, asks."""
+        if m.kind == "minus":
+            m, bound, above = m.parts[0], None if bound is None else -bound, not above
         stay = self._stay(m) if m.kind == "stay" else None
-        for term, shift in [] if stay is None else stay.inside(least):
+        for term, shift in [] if stay is None else stay.sides(bound, above):
             self.add(term, shift, 1.0, 0.0, 0.0, False, Label(m.name, side, 0.0))
 
     def _extension_sign(self, position: str) -> float:

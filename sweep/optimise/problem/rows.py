@@ -166,7 +166,7 @@ def box_sums(
     return [({i: 1.0, j: -1.0}, 0.0) for i, j in (pairs if above else pairs[:1])]
 
 
-INSIDE = 1e-6  # share of a window by which a top or dip that touches its edge stays inside: decidable from samples
+INSIDE = 1e-6  # share of a window by which a top or dip at its edge stays on its side: decidable from samples
 LIMIT_POSITIONS = 4  # highest and lowest limit positions that may come to define the stroke
 
 
@@ -188,46 +188,60 @@ class Stay:
     def sums(self, above: bool) -> list[tuple[Term, float]]:
         """Return sums of atoms for the crank angle in the window: of leaving poses less that of entering ones.
 
-        It is below a bound if the first sum is, and above a bound if all are: each further top raises the lower edge
-        of the window, each further bottom lowers the upper one.  An edge of other ends is extrapolated linearly, which
-        is exact where they are as high as the tracked ones: there the row is active.
+        The angle is below (or else above) a bound if all sums are, of which the first is that of the tracked ends.
+        The others count from a further top or bottom, if the angle shrinks (or else grows) once that is the end.  An
+        edge of other ends is extrapolated linearly, which is exact where they are as high as the tracked ones: there
+        the row is active.
         """
         points, signs = self.points, self._signs()
         if not signs:
             return []
         turns = -math.tau * math.floor(sum(sign * points.phi[k] for k, sign in signs.items()) / math.tau)
-        narrowed = list(itertools.product(self._strokes(0), self._strokes(1)))
+        shares = {k: float(points.level[k]) for k in signs}
+        rates = {k: sign / float(points.position_slope[k]) for k, sign in signs.items()}
+        widens = sum(rates[k] * shares[k] for k in signs) > 0.0
+        falls = sum(rates[k] * (1.0 - shares[k]) for k in signs) < 0.0
+        bottoms, tops = self._others(0) if falls == above else [], self._others(1) if widens == above else []
         sums = []
-        for strokes in narrowed[:1] if above else narrowed:
+        for stroke in itertools.product([self.ends[0], *bottoms], [self.ends[1], *tops]):
             term: Term = {len(points) + k: sign for k, sign in signs.items()}
-            for k, sign in signs.items():
-                weight, share = sign / float(points.position_slope[k]), float(points.level[k])
-                _add_level(term, share, strokes[0 if share == self.window[0] else 1], weight)
-                _add_level(term, share, self.ends, -weight)
+            for k, rate in rates.items():
+                _add_level(term, shares[k], stroke, rate)
+                _add_level(term, shares[k], self.ends, -rate)
             sums.append((term, turns))
         return sums
 
-    def inside(self, least: float | None) -> list[tuple[Term, float]]:
-        """Return sums that are positive while tops and dips stay inside the window.
+    def sides(self, bound: float | None, above: bool) -> list[tuple[Term, float]]:
+        """Return sums that are positive while tops and dips stay on their sides of the window's edges.
 
-        If one leaves it by d, the angle loses 2 (2 d / |curvature|)^(1/2), with an infinite slope at d = 0.  What the
-        angle has in excess of its ``least`` value e may be lost: d <= |curvature| e^2 / 8, here linear in e.
+        Those inside may not leave it if the angle has a least value, those outside may not enter it if it has a
+        largest one (``above``).  If one crosses the edge by d, the angle changes by 2 (2 d / |curvature|)^(1/2), with
+        an infinite slope at d = 0.  Its distance e from its ``bound`` may be used up: d <= |curvature| e^2 / 8, here
+        linear in e.
         """
         points, rows, atoms = self.points, [], np.concatenate([self.points.value, self.points.phi])
-        size = (self.window[1] - self.window[0]) * float(points.value[self.ends[1]] - points.value[self.ends[0]])
-        angles = [] if least is None else self.sums(above=True)
-        within = (points.series == self.series) & (points.kind == STATIONARY)
-        for k in np.flatnonzero(within).tolist():
-            edge, sense = (0, -1.0) if points.sense[k] < 0.0 else (1, 1.0)
-            for stroke in self._strokes(edge) if 0.0 < self.window[edge] < 1.0 else []:
+        width = self.window[1] - self.window[0]
+        size = min(width, 1.0 - width) * float(points.value[self.ends[1]] - points.value[self.ends[0]])
+        angles, away = [] if bound is None else self.sums(above)[:1], -1.0 if above else 1.0
+        own = (points.series == self.series) & (points.kind == STATIONARY)
+        for k in np.flatnonzero(own).tolist():
+            sense, share = float(points.sense[k]), float(points.level[k])
+            upper, outside = share == self.window[1], (share == self.window[0]) == (sense > 0.0)
+            if not 0.0 < share < 1.0 or outside != above:
+                continue
+            # Other ends count that move the edge towards the point.
+            tops, bottoms = ([], self._others(0)) if upper != above else (self._others(1), [])
+            strokes = [self.ends, *((self.ends[0], j) for j in tops), *((j, self.ends[1]) for j in bottoms)]
+            for stroke in strokes:
                 term, shift = {k: -sense / size}, -INSIDE
-                _add_level(term, self.window[edge], stroke, sense / size)
+                _add_level(term, share, stroke, sense / size)
                 for angle, turns in angles:
-                    excess = max(sum(w * float(atoms[j]) for j, w in angle.items()) + turns - (least or 0.0), 0.0)
+                    rest = turns - (bound or 0.0)
+                    excess = max(away * (sum(w * float(atoms[j]) for j, w in angle.items()) + rest), 0.0)
                     rate = abs(float(points.curvature[k])) * excess / (4.0 * size)
                     for j, w in angle.items():
-                        term[j] = term.get(j, 0.0) + rate * w
-                    shift += rate * (turns - (least or 0.0) - 0.5 * excess)
+                        term[j] = term.get(j, 0.0) + away * rate * w
+                    shift += rate * (away * rest - 0.5 * excess)
                 rows.append((term, shift))
         return rows
 
@@ -238,12 +252,10 @@ class Stay:
         outward = np.where(points.level[edges] == self.window[0], -1.0, 1.0) * points.position_slope[edges]
         return dict(zip(edges.tolist(), np.sign(outward).tolist(), strict=True))
 
-    def _strokes(self, edge: int) -> list[tuple[int, int]]:
-        """Return the ends of the stroke, then others of which each narrows the window at this edge."""
-        low, high = self.ends
-        tops, bottoms = self.tops[:LIMIT_POSITIONS], self.bottoms[:LIMIT_POSITIONS]
-        others = [(low, k) for k in tops] if edge == 0 else [(k, high) for k in bottoms]
-        return [self.ends, *(s for s in others if s != self.ends and 0.0 < self.window[edge] < 1.0)]
+    def _others(self, end: int) -> list[int]:
+        """Return the lowest bottoms (end 0) or the highest tops (end 1) besides the end of the stroke itself."""
+        candidates = (self.bottoms, self.tops)[end][:LIMIT_POSITIONS]
+        return [k for k in candidates if k != self.ends[end]]
 
 
 def _add_level(term: Term, share: float, stroke: tuple[int, int], weight: float) -> None:
