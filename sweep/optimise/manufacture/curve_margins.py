@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 
 POSES, HARMONICS = 64, 16  # poses per turn at which the margin is computed, and harmonics of the sum through it
+SMOOTH = 0.02  # share of a margin by which it changes at most over twice that step, unless it jumps
 MOVED = 1e-4  # share of a variable's bounds: step of the difference of exact derivatives, accurate to 1e-4
 
 
@@ -50,20 +51,24 @@ class CurveMargin:
 class Allowance:
     """Margin of a limit beyond a fixed amount: ``slopes`` (V,) times the changes of the parameters ``names``.
 
-    ``reference`` (V,) are the values of these parameters at which the fixed amount is exact.
+    ``reference`` (V,) are the values of these parameters at which the fixed amount is exact.  Tops and dips keep the
+    distance ``at_edges`` from the edges of a window, a share of the window.
     """
 
-    names: tuple[str, ...]
-    reference: Array
-    slopes: Array
+    names: tuple[str, ...] = ()
+    reference: Array = field(default_factory=lambda: np.empty(0))
+    slopes: Array = field(default_factory=lambda: np.empty(0))
+    at_edges: float = 0.0
 
     def times(self, level: float) -> Allowance:
         """Return the allowance multiplied by ``level``."""
-        return replace(self, slopes=level * self.slopes)
+        return replace(self, slopes=level * self.slopes, at_edges=level * self.at_edges)
 
 
 def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[str, float]]) -> dict[str, Allowance]:
     """Return the first-order changes of the margins of some outputs with the variables.
+
+    A margin that jumps, as where another extremum becomes the largest, has none.
 
     Parameters
     ----------
@@ -72,14 +77,14 @@ def allowances(problem: Problem, design: Array, spread: Callable[[Array], dict[s
     spread : returns the margin of every output of a design
     """
     designs, moves = _neighbours(problem, design)
-    margins = [spread(row) for row in designs[1:]]
+    here, *margins = (spread(row) for row in designs)
     n, columns = len(moves), list(problem.columns)
     names = tuple(problem.family.parameter_names[k] for k in columns)
     change = {name: np.array([margins[k][name] - margins[n + k][name] for k in range(n)]) for name in margins[0]}
     return {
         name: Allowance(names, design[columns], _shortest_slopes(moves, values))
         for name, values in change.items()
-        if np.isfinite(values).all()
+        if np.abs(values).max() <= SMOOTH * here[name]
     }
 
 

@@ -19,7 +19,7 @@ from sweep.optimise.manufacture.curve_margins import (
     curve_margins,
     curves_with_margin,
 )
-from sweep.optimise.manufacture.tolerance import SIGMAS, sensitivities, tolerances_of
+from sweep.optimise.manufacture.tolerance import FAR, SIGMAS, edge_deviation, sensitivities, tolerances_of
 from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.limits import meets
@@ -68,6 +68,7 @@ class Scatter:
         self._design: Array = np.empty(0)
         self.curves: dict[str, CurveMargin] = {}
         self.single: dict[str, tuple[float, float]] = {}
+        self.at_edges: dict[str, float] = {}
         self._changes: dict[str, Allowance] = {}
 
     def update(self, design: Array) -> None:
@@ -79,6 +80,8 @@ class Scatter:
         self.curves = curve_margins(self.problem, design, sigma, along)
         single = [name for name, key in self.keys.items() if key not in self.curves]
         self.single = _deviations(self.problem, design, sigma, single)
+        limits = [x for x in inequalities(self.problem) if x.output in self.single]
+        self.at_edges = {x.output: edge_deviation(self.problem, design, sigma, x) for x in limits}
         self._design, self._sigma, self._changes = design.copy(), sigma, {}
 
     def changes(self, names: Sequence[str]) -> dict[str, Allowance]:
@@ -110,7 +113,11 @@ def with_margins(scatter: Scatter, design: Array, levels: Levels, radius: float 
     # A band narrower than both margins becomes infeasible until a design needs smaller ones.
     limits = tuple(_drawn_in(problem, x, fixed[x.output][0]) if x.output in fixed else x for x in problem.limits)
     close = [x.output for x in problem.limits if x.output in fixed and _is_close(x, *fixed[x.output])]
-    allowances = {name: change.times(levels[keys[name]]) for name, change in scatter.changes(close).items()}
+    changes = scatter.changes(close)
+    allowances = {
+        name: replace(changes.get(name, Allowance()), at_edges=scatter.at_edges[name]).times(levels[keys[name]])
+        for name in close
+    }
     lower, upper = problem.lower, problem.upper
     if radius is not None:
         centre = np.clip(problem.scaled(design[None, :])[0], 0.0, 1.0)
@@ -144,7 +151,12 @@ def prices(scatter: Scatter, design: Array, levels: Levels) -> dict[str, Price]:
     duals, form, points = model.certificate(state), state.form, state.form.points
     step = {name: BOUND_STEP * spread for name, (spread, _) in spreads.items()}
     limits = tuple(_drawn_in(tight, x, step[x.output]) if x.output in step else x for x in tight.limits)
-    shifted = Program(replace(tight, limits=limits)).lay_out(model.curves, design, points, form.complete, model.scale)
+    allowances = {
+        name: replace(allowance, at_edges=allowance.at_edges + BOUND_STEP * scatter.at_edges[name])
+        for name, allowance in tight.allowances.items()
+    }
+    tighter = Program(replace(tight, limits=limits, allowances=allowances))
+    shifted = tighter.lay_out(model.curves, design, points, form.complete, model.scale)
     change = (form.rows(state.atoms, 0.0) - shifted.rows(state.atoms, 0.0)) / BOUND_STEP
     price, weight = dict.fromkeys(keys.values(), 0.0), dict.fromkeys(units, 0.0)
     for row, label in enumerate(form.labels):
@@ -185,9 +197,20 @@ def excesses(problem: Problem, outputs: Mapping[str, Array], units: Mapping[str,
         low, high = limit.ends
         violation, unit = np.maximum(low - values, values - high), units[key].spread
         excess = violation / unit if unit > 0.0 else np.where(violation > 0.0, math.inf, -math.inf)
-        excess = np.where(np.isnan(excess), math.inf, excess)
+        excess = _by_rank(np.where(np.isnan(excess), math.inf, excess))
         out[key] = np.maximum(out[key], excess) if key in out else excess
     return {key: np.where(failing, math.inf, excess) for key, excess in out.items()}
+
+
+def _by_rank(excess: Array) -> Array:
+    """Return excesses (n,), of which those behind a jump, as of an angle that a dip cuts off, are normal by rank."""
+    from scipy.special import ndtri
+
+    jumped = np.flatnonzero((excess > FAR) & np.isfinite(excess))
+    out = excess.copy()
+    quantiles = ndtri((np.arange(1.0, len(jumped) + 1.0) - 0.5) / len(excess))
+    out[jumped[np.argsort(-excess[jumped], kind="stable")]] = quantiles[-1:] - quantiles
+    return out
 
 
 def _drawn_in(problem: Problem, limit: Limit, margin: float) -> Limit:

@@ -19,11 +19,12 @@ from sweep.optimise.problem.program import Program
 from sweep.optimise.problem.statement import Problem
 from sweep.quantities.measures import measure
 from sweep.quantities.resolve import output as described
-from sweep.study import Tolerance
+from sweep.study import Limit, Tolerance
 
 SIGMAS = 3.0  # a tolerance of +-t is three standard deviations
 TIE = 1e-6  # relative difference below which extrema count as equal to the largest one
 DIMENSIONS = ("length", "angle", "ratio")  # with a tolerance; ratios are dimensions of a geared drive in planet radii
+FAR = 10.0  # standard deviations beyond which no mechanism is made
 REACH = 0.1  # range of a dimension for the derivatives of step outputs, relative to the longest dimension
 
 
@@ -128,6 +129,36 @@ def _side_gradients(problem: Problem, design: Array) -> tuple[float, Array, Arra
     level = level_gradients(model.curves, stepped(problem, design, state.fractions), points, program.objective, tied)
     tied = np.concatenate([tied, level]) * program.objective.output_slope(float(inner.max()))
     return value, tied.min(axis=0), tied.max(axis=0)
+
+
+def edge_deviation(problem: Problem, design: Array, sigma: Array, limit: Limit) -> float:
+    """Return the largest standard deviation of the distances of tops and dips from the edges of their window.
+
+    They are shares of the window; tops and dips beyond reach of the tolerances, and other outputs, have 0.
+
+    Parameters
+    ----------
+    problem : its window counts
+    design : (P,);  sigma : (P,) standard deviations of the dimensions
+    limit : limit on the angle in the window
+    """
+    if measure(problem.family, limit.output, problem.window).kind != "stay":
+        return 0.0
+    varied, names = np.flatnonzero(sigma), problem.family.parameter_names
+    centre, reach = design[varied], 0.5 * sigma[varied]
+    fixed = {name: float(x) for k, (name, x) in enumerate(zip(names, design, strict=True)) if k not in varied}
+    # Where the limit is missed, tops and dips may use up nothing of the angle.
+    short = replace(limit, minimum=limit.minimum and math.tau, maximum=limit.maximum and 0.0)
+    own = Problem(
+        problem.family, tuple(names[k] for k in varied), centre - reach, centre + reach, fixed, names[varied[0]],
+        (short,), problem.window,
+    )  # fmt: skip
+    model = Model(own, Program(own), design, lambda: False)
+    state = model.state(np.full(len(varied), 0.5))
+    at_edges = np.array([label.bound_ratio == 0.0 for label in state.form.labels], dtype=np.bool_)
+    distance = state.form.rows(state.atoms, 0.0)[at_edges]
+    spread = np.linalg.norm(model.jacobian(state.fractions, state.form, state.form.points)[at_edges], axis=1)
+    return float(spread[distance < FAR * spread].max(initial=0.0))
 
 
 def tolerances_of(family: Family, design: Array, tolerance: Tolerance) -> Array:

@@ -36,7 +36,8 @@ class Requirement:
     """One limit in the optimiser's inner values (`Measure`); it is an equation if ``minimum == maximum``.
 
     ``lower_shift`` and ``upper_shift`` are the changes of its bounds with parameters: derivatives by name, and the sum
-    of these times the values at which the bounds hold as given.
+    of these times the values at which the bounds hold as given.  Tops and dips keep the distance ``at_edges`` from the
+    edges of a window, a share of the window.
     """
 
     measure: Measure
@@ -44,6 +45,7 @@ class Requirement:
     maximum: float | None
     lower_shift: BoundShift = NO_SHIFT
     upper_shift: BoundShift = NO_SHIFT
+    at_edges: float = 0.0
 
     @property
     def equal(self) -> bool:
@@ -83,7 +85,8 @@ class Program:
             allowance = problem.allowances.get(limit.output)
             lower = _bound_shift(quantity, limit.minimum, allowance, 1.0)
             upper = _bound_shift(quantity, limit.maximum, allowance, -1.0)
-            self.requirements.append(Requirement(quantity, bounds[0], bounds[1], lower, upper))
+            at_edges = 0.0 if allowance is None else allowance.at_edges
+            self.requirements.append(Requirement(quantity, bounds[0], bounds[1], lower, upper, at_edges))
         measures = [self.objective, *(r.measure for r in self.requirements)]
         self.series = tuple(dict.fromkeys(s for m in measures for s in m.series))
         names = [name for r in self.requirements for side in (r.lower_shift, r.upper_shift) for name in side[0]]
@@ -154,7 +157,8 @@ class _Layout:
         self._exclude_earlier_passages(r, "minimum" if r.maximum is None else "maximum")
         for bound, above in ((r.minimum, False), (r.maximum, True)):
             if bound is not None:
-                self.keep_sides(r.measure, bound, above, "equal" if r.equal else "maximum" if above else "minimum")
+                side = "equal" if r.equal else "maximum" if above else "minimum"
+                self.keep_sides(r.measure, bound, above, side, r.at_edges)
         sides = [("minimum", r.minimum, 1.0, r.lower_shift), ("maximum", r.maximum, -1.0, r.upper_shift)]
         for side, bound, sense, change in [("equal", r.minimum, 1.0, NO_SHIFT)] if r.equal else sides:
             if bound is None:
@@ -283,12 +287,12 @@ class _Layout:
         tops, bottoms = self._extrema([self.curves.series[self.curves.position[n]]])
         return None if low < 0 else Stay(self.points, n, m.series[0].window or (0.0, 1.0), (low, high), bottoms, tops)
 
-    def keep_sides(self, m: Measure, bound: float | None, above: bool, side: str) -> None:
+    def keep_sides(self, m: Measure, bound: float | None, above: bool, side: str, margin: float = 0.0) -> None:
         """Keep tops and dips on their sides of a window's edges, as far as a bound of its angle, or the least, asks."""
         if m.kind == "minus":
             m, bound, above = m.parts[0], None if bound is None else -bound, not above
         stay = self._stay(m) if m.kind == "stay" else None
-        for term, shift in [] if stay is None else stay.sides(bound, above):
+        for term, shift in [] if stay is None else stay.sides(bound, above, margin):
             self.add(term, shift, 1.0, 0.0, 0.0, False, Label(m.name, side, 0.0))
 
     def _extension_sign(self, position: str) -> float:

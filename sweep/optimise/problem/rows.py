@@ -211,13 +211,13 @@ class Stay:
             sums.append((term, turns))
         return sums
 
-    def sides(self, bound: float | None, above: bool) -> list[tuple[Term, float]]:
+    def sides(self, bound: float | None, above: bool, margin: float) -> list[tuple[Term, float]]:
         """Return sums that are positive while tops and dips stay on their sides of the window's edges.
 
         Those inside may not leave it if the angle has a least value, those outside may not enter it if it has a
-        largest one (``above``).  If one crosses the edge by d, the angle changes by 2 (2 d / |curvature|)^(1/2), with
-        an infinite slope at d = 0.  Its distance e from its ``bound`` may be used up: d <= |curvature| e^2 / 8, here
-        linear in e.
+        largest one (``above``); they keep a ``margin``, a share of the window.  If one crosses the edge by d, the angle
+        changes by 2 (2 d / |curvature|)^(1/2), with an infinite slope at d = 0.  Its distance e from its ``bound`` may
+        be used up: d <= |curvature| e^2 / 8, here linear in e.
         """
         points, rows, atoms = self.points, [], np.concatenate([self.points.value, self.points.phi])
         width = self.window[1] - self.window[0]
@@ -233,7 +233,7 @@ class Stay:
             tops, bottoms = ([], self._others(0)) if upper != above else (self._others(1), [])
             strokes = [self.ends, *((self.ends[0], j) for j in tops), *((j, self.ends[1]) for j in bottoms)]
             for stroke in strokes:
-                term, shift = {k: -sense / size}, -INSIDE
+                term, shift = {k: -sense / size}, -INSIDE - margin
                 _add_level(term, share, stroke, sense / size)
                 for angle, turns in angles:
                     rest = turns - (bound or 0.0)
