@@ -77,7 +77,7 @@ def crank_of_phi0(phi0: Numbers, e: Numbers, f: Numbers, alpha: Numbers, status:
     for i in range(phi0.shape[0]):
         tangent = math.tan(alpha[i])
         reach = math.hypot(e[i], f[i] * tangent)
-        fine = 0.0 < phi0[i] < math.pi and 0.0 < reach < math.inf and abs(tangent) < 1e15
+        fine = 0.0 < phi0[i] < math.pi and 8.0 * EPS * abs(f[i]) < reach < math.inf and abs(tangent) < 1e15
         status[i] = st.OK if fine else st.NOT_ADMISSIBLE
         a[i] = math.cos(0.5 * phi0[i]) * reach if fine else math.nan
 

@@ -102,7 +102,9 @@ def _finish(
     u2, v2 = u1 * r.cos_phi0 - v1 * r.sin_phi0, v1 * r.cos_phi0 + u1 * r.sin_phi0
     t1 = -(r.e - a * u1) * y1 - (r.f * r.sa + a * r.ca * v1) * x1
     t2 = -(r.e - a * u2) * y2 - (r.f * r.sa + a * r.ca * v2) * x2
-    finite = p.exists and 0.0 < c.real < math.inf and 0.0 < b.real < math.inf
+    apart = abs(r.e.real) + abs(r.h.real)  # of the axes: 0 but for rounding where they are in line
+    exists = p.exists and apart > 8.0 * EPS * abs(r.g.real) and 8.0 * EPS * apart < c.real < math.inf
+    finite = exists and 0.0 < b.real < math.inf
     test = first_failure(finite, ahead.real, back.real, a.real, t1.real, t2.real, r.branch)
     failed[i] = test
     status[i] = design_status(r.valid, test)
@@ -250,8 +252,9 @@ def rssr_at_direction(
             way = math.copysign(1.0, u1 * cosine + v1 * sine)
             u1, v1 = way * cosine, way * sine
         side = (qx1 * qx2 + qy1 * qy2) * c0 + (qx1 * qy2 - qy1 * qx2) * s0
-        near = abs(p2) > 8.0 * EPS * (abs(ca * r.sin_swing * c0) + abs(s0)) or root[i] < 0.0  # else at infinity
-        point = near and inner >= 0.0 and c > 0.0 and rho1 > 0.0
+        # Else at infinity or on the rocker axis, within the rounding of right angles in phi0 and alpha.
+        within = abs(p2 if root[i] > 0.0 else s0) > 8.0 * EPS
+        point = within and inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
         _finish(r, _Point(x1, y1, rho1, back, point), u1, v1, i, status, failed, designs)
         write_number(phi1, i, math.atan2(v1, u1) if status[i] == 0 else math.nan)

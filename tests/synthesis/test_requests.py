@@ -39,6 +39,34 @@ def test_pressure_limit_out_of_range_is_refused():
         sweep.synthesise("rssr", requirements(1, 1), max_pressure_angle=2.0)
 
 
+@pytest.mark.parametrize(
+    ("change", "most"),
+    [
+        ({"phi0": math.pi}, 1),  # in half a turn the other root is the rocker axis itself, c = 0
+        ({"phi0": math.pi, "alpha": math.pi / 2}, 0),  # all balls of this locus lie at psi1 = -swing/2
+        ({"phi0": math.pi, "alpha": -math.pi / 2, "e": 0.0}, 0),
+        ({"e": 0.0, "alpha": math.pi}, 0),  # axes in line
+        ({"e": 0.0, "alpha": math.pi, "phi1": True}, 0),
+    ],
+)
+def test_mechanism_of_rounded_right_angles_is_none(change, most):
+    """At the floats next to 90 and 180 degrees there were cranks of 1e-16 and couplers of 1e15."""
+    place = "phi1" if change.get("phi1") else "psi1"
+    table = requirements(500, 7, **{name: x for name, x in change.items() if name != "phi1"})
+    found = sweep.synthesise("rssr", table.rename(columns={"phi1": place}))
+    made = found[~found["a"].isna()]
+    lengths = made[["a", "b", "c"]].to_numpy()
+    assert (made.index.value_counts() <= most).all()
+    assert len(made) >= 50 * most and ((lengths > 1e-7) & (lengths < 1e7)).all()
+    assert set(found["status"][found["a"].isna()]) == {st.NOT_ADMISSIBLE}
+
+
+def test_slot_whose_axes_are_in_line_has_no_crank():
+    found = sweep.synthesise("slotted", {"phi0": 2.0, "e": [0.0, 0.5], "f": 1.0, "alpha": math.pi})
+    assert list(found["status"]) == [st.NOT_ADMISSIBLE, st.OK]
+    assert found["a"].iloc[1] == pytest.approx(0.5 * math.cos(1.0), rel=1e-15)
+
+
 def test_rocker_of_given_length_is_the_mechanism_of_its_offsets():
     rng = np.random.default_rng(12)
     n = 4000
