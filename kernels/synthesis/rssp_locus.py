@@ -100,7 +100,7 @@ def rssp_on_locus(requirements: Array, status: Status, failed: Status, designs: 
         e, start, end = per * ca * u1 * u2, per * v1 * u2, per * v2 * u1
         middle = 0.5 * per * (v1 * u2 + v2 * u1)
         valid = _valid(stroke, phi1, f, alpha) and abs(phi1.real) < 1e5 and 0.0 < phi0.real < TWO_PI
-        point = abs(s0.real) > 4.0 * EPS
+        point = min(abs(s0.real), abs(ca.real)) > 4.0 * EPS
         at = Limits(start, end, middle, per * ca * u2, per * ca * u1, v1, v2, point)
         _finish(Given(stroke, e, f, alpha, sa, ca, valid), at, i, status, failed, designs)
         write_number(s1, i, start if status[i] == 0 else math.nan)
@@ -116,7 +116,7 @@ def _between(
     y1, y2 = s1 * ca, s2 * ca
     rho1, rho2 = math.sqrt(e * e + y1 * y1), math.sqrt(e * e + y2 * y2)
     back = -rho2 if side < 0.0 else rho2
-    point = point and rho1 > 0.0 and rho2 > 0.0
+    point = point and min(rho1, rho2) > 4.0 * EPS * max(abs(s1), abs(s2))
     _finish(g, Limits(s1, s2, middle, rho1, back, y1 / rho1, -y2 / rho2, point), i, status, failed, designs)
     return math.atan2(y1, e) if status[i] == 0 else math.nan
 

@@ -21,6 +21,8 @@ from kernels.linkage.outputs import write_number
 from kernels.synthesis.acceptance import design_status, first_failure
 from kernels.types import EPS, TWO_PI, Array, Status
 
+WITHIN = 16.0 * EPS  # of sums of products of sines: what the rounding of right angles may make of 0
+
 
 class _Requirement(NamedTuple):
     """One row of the requirements with the sines and cosines that the equations need."""
@@ -77,7 +79,7 @@ def _point(r: _Requirement, u1: float, v1: float) -> _Point:
     ss, q, ca = r.sin_swing, r.versed, r.ca
     along = ca * (1.0 - q) * r.sin_phi0
     det = along - ss * (v1 * v2 + ca * ca * u1 * u2)
-    exists = abs(det.real) > 8.0 * EPS * (abs(ss.real) * (1.0 + (ca * ca).real) + abs(along.real))
+    exists = abs(det.real) > WITHIN
     per_det = 1.0 / det if exists else math.nan
     x = (r.e * (ss * v1 * v2 - ca * (r.sin_phi0 + q * v1 * u2)) + r.h * u1 * (ss * v2 - q * ca * u2)) * per_det
     y = (r.h * (r.sin_phi0 - q * u1 * v2 - ss * ca * u1 * u2) - r.e * v1 * (q * v2 + ss * ca * u2)) * per_det
@@ -103,8 +105,9 @@ def _finish(
     t1 = -(r.e - a * u1) * y1 - (r.f * r.sa + a * r.ca * v1) * x1
     t2 = -(r.e - a * u2) * y2 - (r.f * r.sa + a * r.ca * v2) * x2
     apart = abs(r.e.real) + abs(r.h.real)  # of the axes: 0 but for rounding where they are in line
-    exists = p.exists and apart > 8.0 * EPS * abs(r.g.real) and 8.0 * EPS * apart < c.real < math.inf
-    finite = exists and 0.0 < b.real < math.inf
+    nearest = min(c.real, abs(ahead.real), abs(back.real))  # of the ball to an axis
+    exists = p.exists and apart > 8.0 * EPS * abs(r.g.real) and nearest > 8.0 * EPS * apart
+    finite = exists and c.real < math.inf and 0.0 < b.real < math.inf
     test = first_failure(finite, ahead.real, back.real, a.real, t1.real, t2.real, r.branch)
     failed[i] = test
     status[i] = design_status(r.valid, test)
@@ -252,9 +255,8 @@ def rssr_at_direction(
             way = math.copysign(1.0, u1 * cosine + v1 * sine)
             u1, v1 = way * cosine, way * sine
         side = (qx1 * qx2 + qy1 * qy2) * c0 + (qx1 * qy2 - qy1 * qx2) * s0
-        # Else at infinity or on the rocker axis, within the rounding of right angles in phi0 and alpha.
-        within = abs(p2 if root[i] > 0.0 else s0) > 8.0 * EPS
-        point = within and inner >= 0.0 and c > 0.0 and rho1 > 0.0
+        exists = abs(p2 if root[i] > 0.0 else s0) > WITHIN  # else at infinity, or on the rocker axis
+        point = exists and inner >= 0.0 and c > 0.0 and rho1 > 0.0
         back = -rho2 if side < 0.0 else rho2
         _finish(r, _Point(x1, y1, rho1, back, point), u1, v1, i, status, failed, designs)
         write_number(phi1, i, math.atan2(v1, u1) if status[i] == 0 else math.nan)

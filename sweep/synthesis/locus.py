@@ -225,9 +225,10 @@ def admissible_arcs(family: str, requirement: Mapping[str, float]) -> list[tuple
     form.arc_ends(row, ends)
     boundaries = np.unique(ends[np.isfinite(ends)])
     following = np.append(boundaries[1:], boundaries[0] + TWO_PI)
-    middles = np.repeat(row, boundaries.size, axis=0)
-    middles[:, form.parameter_names.index("phi1")] = 0.5 * (boundaries + following)
-    failed = form.solve(middles).failed
+    # One place each; the middle of an arc of a symmetric locus may be on the rocker axis.
+    places = np.repeat(row, boundaries.size, axis=0)
+    places[:, form.parameter_names.index("phi1")] = 0.6 * boundaries + 0.4 * following
+    failed = form.solve(places).failed
     inside = (failed != acceptance.SIDE) & (failed != acceptance.NO_POINT)
     arcs: list[tuple[float, float]] = []
     for start, end, good in zip(boundaries.tolist(), following.tolist(), inside.tolist(), strict=True):

@@ -280,6 +280,10 @@ def test_arcs_are_where_the_side_condition_holds():
     (arc,) = admissible_arcs("rssp", {"stroke": 1.0, "phi0": 3.3, "f": 0.1, "alpha": 0.2})
     # sin(phi0) < 0: cos(phi1) > 0 and cos(phi1 + phi0) < 0
     assert arc == pytest.approx((1.5 * math.pi, 3.5 * math.pi - 3.3), abs=1e-14)
+    # rho2 = 0 at tan(phi1) = +-ca q/S; in the middle of the arc the ball is on the rocker axis
+    half = {"swing": -0.5 * math.pi, "phi0": math.pi, "e": 0.0, "f": 0.3, "g": -1.0, "alpha": math.pi / 3.0}
+    (arc,) = admissible_arcs("rssr", half)
+    assert arc == pytest.approx((math.atan(0.5), math.pi - math.atan(0.5)), abs=1e-14)
 
 
 def test_arcs_of_a_rocker_of_given_length_are_refused():
