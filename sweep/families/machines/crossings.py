@@ -184,10 +184,6 @@ class Poses:
         left, right, end = column * step, (column + 1) * step, ends[row, column]
         phi = 0.5 * (left + right)
         phi[~end] = self._root(row[~end], left[~end], right[~end], rate, slope)
-        # A cam that turns back without a dwell is so flat there that polynomials miss the place by more than they show.
-        far = np.abs(self.near(row, phi, rate)) > FLAT * np.abs(slope).max(axis=1)[row] if row.size else end
-        rows = row[far & ~end]
-        phi[far & ~end] = zeros(lambda k, x: self.near(rows[k], x, rate), left[far & ~end], right[far & ~end])
         rows = row[end]
         phi[end] = zeros(lambda k, x: np.where(self.near(rows[k], x, rate) == 0.0, -1.0, 1.0), left[end], right[end])
         return CrankAngles(row, phi)
@@ -241,8 +237,9 @@ class Poses:
     def _root(self, row: Indices, left: Array, right: Array, name: str, off: Array, level: float = 0.0) -> Array:
         """Find a root in each bracket where an output passes a level.
 
-        It is computed on polynomials through samples (n, m) of how far it lies beyond, then corrected by one step on
-        poses; where that step is not small, the polynomial is inaccurate and the root is found on poses alone.
+        It is computed on polynomials through samples (n, m) of how far it lies beyond, then corrected by two steps on
+        poses; where the first is not small or what it leaves is not, the polynomial is inaccurate and the root is found
+        on poses alone.  A cam is flat where it turns back: there polynomials miss the place by more than they show.
         """
         if not row.size:
             return np.zeros(0)
@@ -252,17 +249,22 @@ class Poses:
         polynomial = np.linalg.solve(np.vander(np.arange(-2.0, 4.0), increasing=True), near.T)
         on_samples: Any = lambda k, t: polyval(t, polynomial[:, k], tensor=False)  # noqa: E731
         t = zeros(on_samples, left / step - column, right / step - column)
-        guess: Array = (column + t) * step
-        height = beyond(self.near(row, guess, name), level, wraps)
+
+        def beyond_at(k: Indices, phi: Array) -> Array:
+            return beyond(self.near(row[k], phi, name), level, wraps)
+
+        every, guess = np.arange(row.size), (column + t) * step
+        height = beyond_at(every, guess)
         with np.errstate(divide="ignore", invalid="ignore"):
             better = guess - height * step / polyval(t, polyder(polynomial), tensor=False)
         close = (np.abs(better - guess) <= NEAR * step) & (better >= left) & (better <= right)
-        rest = np.flatnonzero(~close)
-        if rest.size:
-            some = row[rest]
-            better[rest] = zeros(
-                lambda k, phi: beyond(self.near(some[k], phi, name), level, wraps), left[rest], right[rest]
-            )
+        better = np.where(close, better, guess)
+        left_over = beyond_at(every, better)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            last = better - left_over * (better - guess) / (left_over - height)
+        better = np.where(np.abs(last - better) < np.abs(better - guess), last, better)
+        rest = np.flatnonzero(~close | (np.abs(left_over) > FLAT * np.abs(off).max(axis=1)[row]))
+        better[rest] = zeros(lambda k, phi: beyond_at(rest[k], phi), left[rest], right[rest])
         return np.asarray(better, np.float64)
 
     def least(self, row: Indices, start: Array, end: Array, name: str, samples: int = 64) -> Array:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
 import sweep
 from kernels import status as st
@@ -286,3 +286,16 @@ def test_figure_has_demand_surplus_and_speed_of_every_thread():
     figure.canvas.draw()
     legends = [(axes, axes.get_legend()) for axes in figure.axes if axes.get_legend()]
     assert legends and all(words.get_window_extent().y0 >= axes.get_window_extent().y1 for axes, words in legends)
+
+
+@pytest.mark.parametrize("fall", [0.4, 0.2])
+def test_thread_leaves_a_place_where_the_cam_passes_the_level(fall):
+    """Just before a cycloidal fall ends its third derivative jumps: the place was left up to 1e-7 rad beside it."""
+    cam = {"lift": 20.0, "rise": 2.0, "dwell": 0.0, "fall": fall, "start": 1.0, "law": 3.0, "r0": 30.0, "e": 0.0}
+    level = {"event": "m.r_x", "level": 30.02}
+    thread = {"thread": [[0.0, 0.0, 50.0], {"on": HOLE.tolist(), "held": ["up", "down"]}, [0.0, 0.0, -50.0]]}
+    made = sweep.machine({"m": "cam"}, {"up": level, "down": level | {"rising": False}, "upper": thread})
+    share = brentq(lambda x: x - math.sin(TURN * x) / TURN - 0.001, 0.0, 0.5, xtol=1e-16)
+    near = (3.0 + (1.0 - share) * fall) + 1e-12 * np.array([-1.0, 1.0])  # a rounding of 50 over a slope of 3 at least
+    (length,) = poses(made, ["needed"], near, {f"m.{name}": value for name, value in cam.items()})
+    assert length[0] - length[1] > 1.0
