@@ -32,6 +32,11 @@ from tests.optimise.test_front import TABLE, written
 from tests.support.engine_study import ROOT, SMALL_CHUNKS, chunk_bytes, write_study
 
 
+def few_failures() -> Any:
+    """A worker that dies over a task twice ends it."""
+    return dask.config.set({"distributed.scheduler.allowed-failures": 1})
+
+
 @pytest.fixture(autouse=True)
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in SMALL_CHUNKS.items():
@@ -41,8 +46,7 @@ def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
     """A cluster that outlives its users, as one of many machines does."""
-    few = dask.config.set({"distributed.scheduler.allowed-failures": 1})
-    with few, LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
+    with few_failures(), LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
         yield cluster.scheduler_address
 
 
@@ -116,9 +120,10 @@ def test_a_killed_worker_is_survived(
     assert chunk_bytes(out) == whole
 
 
-def test_a_task_that_kills_every_worker_ends_the_run(study: Study, address: str, tmp_path: Path) -> None:
+def test_a_task_that_kills_every_worker_ends_the_run(study: Study, tmp_path: Path) -> None:
+    """It has a cluster of its own, so that no other test waits for the workers that it kills."""
     task = Fatal(ChunkTask(study, make_plan(study), tmp_path), tmp_path / "mark", before=True, always=True)
-    with Dask(address) as place, pytest.raises(WorkerDied, match="several workers died over one task"):
+    with few_failures(), Dask() as place, pytest.raises(WorkerDied, match="several workers died over one task"):
         list(place.outcomes(task, iter([2]), 2, Stop()))
     assert not list(tmp_path.glob("part-*"))
 
