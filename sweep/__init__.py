@@ -20,6 +20,7 @@ from sweep.errors import InputError as InputError
 from sweep.errors import LinksweepError as LinksweepError
 from sweep.errors import LinksweepWarning as LinksweepWarning
 from sweep.errors import StudyError as StudyError
+from sweep.errors import nearest as _nearest
 
 if TYPE_CHECKING:
     from sweep.dataset.comparison import compare as compare
@@ -74,7 +75,7 @@ def __getattr__(name: str) -> Any:
     elif name in _HOMES:
         globals()[name] = getattr(import_module(_HOMES[name]), name)
     else:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{_nearest(name, __all__)}")
     return globals()[name]
 
 

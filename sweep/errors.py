@@ -241,6 +241,17 @@ SYNONYMS = {
     "arcmin": ("deg",),
     "inch": ("in",),
     "inches": ("in",),
+    "min": ("from",),
+    "max": ("to",),
+    "start": ("from",),
+    "stop": ("to",),
+    "from": ("min",),
+    "to": ("max",),
+    "lower": ("min", "from"),
+    "upper": ("max", "to"),
+    "step": ("count",),
+    "steps": ("count",),
+    "num": ("count",),
 }
 
 
@@ -252,6 +263,8 @@ def closest(word: str, known: Iterable[str]) -> str | None:
     matches = matches or [name for name in SYNONYMS.get(_SPACE.sub("_", word.casefold()), ()) if name in choices]
     if not matches:
         alike = difflib.get_close_matches(word, choices, n=8, cutoff=0.5)
+        if not alike and word != word.casefold():
+            return closest(word.casefold(), choices)
         near = difflib.get_close_matches(word, alike, n=8, cutoff=ALIKE)
         # The first letter is rarely wrong: psy is psi, and not eps_y.
         matches = sorted((n for n in alike if n in near or _begins(word, n)), key=lambda name: name[:1] != word[:1])
@@ -266,12 +279,12 @@ def _begins(word: str, name: str) -> bool:
 def nearest(word: str, known: Iterable[str]) -> str:
     """Return ``", did you mean 'x'?"`` for the known word nearest to ``word``, or an empty string.
 
-    A name without its member, such as ``speed`` in a machine, means that of every member.
+    A name without its member or stage, such as ``speed`` in a machine or ``a`` in a chain, means that of every one.
     """
-    names = list(known)
-    if len(members := [name for name in names if name.endswith(f".{word}")]) > 1:
-        return f", did you mean {listed(members)}?"
-    guess = closest(word, names)
+    names, each = list(known), re.compile(f".*[.]{re.escape(word)}|{re.escape(word)}[1-9]")
+    several, guess = [name for name in names if each.fullmatch(name)], closest(word, names)
+    if len(several) > 1 or (several and not guess):
+        return f", did you mean {listed(several)}?"
     return f", did you mean '{guess}'?" if guess else ""
 
 

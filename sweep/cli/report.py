@@ -73,7 +73,7 @@ ENDINGS = (".svg", ".png", ".pdf")
 
 
 @click.command()
-@click.argument("what", type=click.Choice([*OF_DESIGNS, *OF_DATASETS]))
+@click.argument("what", type=click.Choice([*OF_DESIGNS, *OF_DATASETS]), metavar="WHAT")
 @click.argument("source")
 @click.argument("table", required=False, type=IS_FILE)
 @click.option("--out", required=True, type=A_FILE, help="A .svg, .png or .pdf file; of cyclogram also a .csv table.")
@@ -89,7 +89,7 @@ ENDINGS = (".svg", ".png", ".pdf")
 @click.option("--positions", type=click.IntRange(min=1), default=1, show_default=True, help="For mechanism: how many.")
 @click.option("--output", help="For tolerance: output whose histogram is drawn; without it, all outputs in percent.")
 def draw(what: str, source: str, table: Path | None, out: Path, **options: Any) -> None:
-    """Draw one picture.
+    """Draw one picture: WHAT is motion, mechanism, polar_load, cyclogram, map, front, tolerance or sensitivity.
 
     SOURCE is a FOLDER that `sweep run` left behind, or FAMILY with a TABLE of designs (.parquet or .csv, angles in rad
     unless --angles or a header such as `alpha [deg]` says otherwise), of which --row is drawn.  map, front, tolerance

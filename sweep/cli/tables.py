@@ -181,7 +181,8 @@ def read_table(path: Path) -> pd.DataFrame:
         with path.open("rb") as file:
             head = file.readline()
         if b"," not in head and (b";" in head or b"\t" in head):
-            raise InputError("table", path.name, "values between commas, with decimal points", str(path))
+            line = head.decode("utf-8", "replace").strip()
+            raise InputError("first line", line, "values between commas, with decimal points", str(path))
         # The parser of pandas up to version 2 was off by an ulp for some numbers by default.
         table = csv.read_csv(path)
         foreign = [field.name for field in table.schema if is_binary(field.type)]
@@ -193,7 +194,8 @@ def read_table(path: Path) -> pd.DataFrame:
         raise
     except Exception as error:  # damaged metadata can raise any exception in pandas
         first = next(iter(str(error).splitlines()), type(error).__name__)  # a schema may follow
-        raise InputError("table", path.name, f"readable {suffix[1:]} ({first})", str(path)) from error
+        form = "parquet" if suffix == ".parquet" else "csv in UTF-8 with the names of the columns in its first line"
+        raise InputError("table", path.name, f"readable {form} ({first})", str(path)) from error
 
 
 def write_table(frame: pd.DataFrame, out: Path | None) -> None:

@@ -95,6 +95,8 @@ def unwritable(place: Path | str) -> Iterator[None]:
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary name beside a file; the file written there replaces the file as a whole, or is deleted."""
+    if not path.parent.is_dir():
+        raise StoreError(f"{path}: cannot be written: there is no folder {path.parent}")
     partial = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
     try:
         with unwritable(path):

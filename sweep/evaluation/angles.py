@@ -23,8 +23,8 @@ AngleUnit: TypeAlias = Literal["rad", "deg"]
 
 RADIANS = math.pi / 180.0  # of a degree
 REMEDY = (
-    'for degrees say angles="deg" (--angles deg), or "{name} [deg]" as the column\'s name, or a text such as "90 deg"; '
-    'if they are in rad, say angles="rad" (--angles rad)'
+    'for degrees write "90 deg", or "{name} [deg]" as the column\'s name, or angles="deg" (--angles deg) where that is '
+    'an argument; if they are in rad, "{name} [rad]", or angles="rad" (--angles rad)'
 )
 
 # Most angles lie between two directions and are at most one turn, with slack for rounding.  Crank angles, the offset of

@@ -138,7 +138,8 @@ def read_mount(table: Mapping[str, Any], shafts: Mapping[str, Shaft], where: str
     """
     name = table["shaft"]
     if name not in shafts:
-        raise InputError("shaft", name, f"one of {choices(str(name), shafts)}", where)
+        known = f"one of {choices(str(name), shafts)}" if shafts else "the name of a shaft in [shafts]; there is none"
+        raise InputError("shaft", name, known, where)
     for key in ("place", "ratio", "offset", "driver"):
         if key in table:
             allowed = "nothing beside shaft, which decides it: give sense, shift, turn and key"

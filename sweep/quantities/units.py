@@ -188,7 +188,7 @@ def plain(values: Any, internal: str, name: str, place: str = "units") -> Any:
     rows = list(values)
     if not any(map(_says, rows)):
         return values
-    return [one_value(value, internal, name, place) if _says(value) else value for value in rows]
+    return [one_value(v, internal, name, f"{place}, row {k}") if _says(v) else v for k, v in enumerate(rows)]
 
 
 def _says(value: object) -> bool:

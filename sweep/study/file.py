@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ from sweep.quantities import units
 Key: TypeAlias = tuple[str | int, ...]
 
 _LONGEST_VALUE = 60
+_NUMBER = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*")
 
 
 class Faults:
@@ -44,6 +46,7 @@ class Faults:
         self._files, self._places = files, places
         self._misspelt: set[Key] = set()
         self._known: int | None = None  # faults that were there before a mechanism was guessed
+        self.homes: dict[str, str] = {}  # where a key belongs, for one that stands in another table
         self._fits = True
 
     def guess(self) -> None:
@@ -81,7 +84,8 @@ class Faults:
         guess = closest(str(key[-1]), names)
         if guess is not None:
             self._misspelt.add((*key[:-1], guess))
-        self.unknown_name(key, what, choices(str(key[-1]), names))
+        home = self.homes.get(str(key[-1])) if guess is None and len(key) < 3 else None
+        self.unknown_name(key, what, choices(str(key[-1]), names) + (f"; {key[-1]} is {home}" if home else ""))
 
     def unknown_name(self, key: Key, what: str, allowed: str) -> None:
         """Report a key that should name a known item."""
@@ -284,7 +288,7 @@ def read_table(model: type[S], name: str, file: StudyFile) -> S:
 def read_section(model: type[S], raw: object, key: Key, faults: Faults) -> S:
     """Read a table by its model; report faulty keys and leave them at their defaults."""
     if not isinstance(raw, dict):
-        faults.value(key, raw, f"a table with the keys {', '.join(_keys(model))}")
+        faults.value(key, raw, f"a table with the keys {', '.join(fields(model))}")
         return model()
     section = _validated(model, raw, key, faults)
     _missing_keys(model, raw, key, faults)
@@ -312,14 +316,21 @@ def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults)
             place = tuple(part for part in item["loc"] if part not in (ONE, WORD, LIST, TABLE))
             bad.add(place[0])
             if item["type"] == "extra_forbidden":
-                faults.unknown((*key, *place), _keys(_reached(model, place[:-1])[0]))
+                faults.unknown((*key, *place), fields(_reached(model, place[:-1])[0]))
             else:
                 context = item.get("ctx", {}) if item["type"] == QUANTITY else {}
-                faults.value((*key, *place), item["input"], context.get("words") or _reached(model, place)[1])
+                words = context.get("words") or f"{_reached(model, place)[1]}{unquoted(item['input'], item['type'])}"
+                faults.value((*key, *place), item["input"], words)
         return model.model_validate({name: value for name, value in raw.items() if name not in bad})
 
 
-def _keys(model: type[Section]) -> dict[str, Any]:
+def unquoted(value: object, kind: str = "float_type") -> str:
+    """Say that a number or a truth value stands without quotes, where a study has it in quotes."""
+    numeric = kind in ("float_type", "int_type") and isinstance(value, str) and _NUMBER.fullmatch(value)
+    return ", without quotes" if numeric or (kind == "bool_type" and value in ("true", "false")) else ""
+
+
+def fields(model: type[Section]) -> dict[str, Any]:
     """Return the fields of a model by their names in the file."""
     return {field.alias or name: field for name, field in model.model_fields.items()}
 
@@ -332,7 +343,7 @@ def _reached(model: type[Section], place: Key) -> tuple[type[Section], str]:
     words = ""
     for part in place:
         if isinstance(part, str):
-            field = _keys(model).get(part)
+            field = fields(model).get(part)
             model = Section if field is None else _table_in(field.annotation)
             words = words if field is None else str(field.description)
     return model, words

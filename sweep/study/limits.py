@@ -146,7 +146,7 @@ def read_limits(file: StudyFile, family: Family, prescribed: Mapping[str, Entry]
         before = len(limits)
         if is_flag(name):
             if entry is not True:
-                faults.value(key, entry, "true")
+                faults.value(key, entry, "true, without quotes; to drop this limit, delete the line")
             limits.append(Limit(name, minimum=1.0))
         elif isinstance(entry, str) and ("+-" in entry or "±" in entry or entry.lstrip()[:1] in _SIDES):
             limits += _read_text(output, entry, key, faults)

@@ -62,7 +62,8 @@ class ToolSection(Section):
 
 Names = Annotated[list[str], Field(min_length=1)]
 
-# Tables in which the entries of a member may stand in a table of the member's name.
+# Tables in which the entries of a member may stand in a table of the member's name, and keys that only an entry has.
+ENTRY = {"min", "max", "from", "to", "value", "values", "kind", "mean", "file", "material"}
 BY_MEMBER = (("design",), ("bodies",), ("loads",), ("limits",), ("reference", "design"))
 
 
@@ -186,10 +187,23 @@ def read_mechanism(
         return None if family is None else (names, family)
     if "mechanism" in file:
         faults.value(("mechanism",), data["mechanism"], "either [mechanism] or [machine.NAME], not both")
+        return None  # which of them the other tables describe is not known
+    if isinstance(data["machine"], dict) and _misspelt_members(data, faults):
+        return None  # each of its entries would be a fault too
     for table in ("locus", "fit"):
         if table in file:
             faults.value((table,), data[table], "nothing here: it finishes the links of a [mechanism] alone")
     return _machine(data, faults, threads)
+
+
+def _misspelt_members(data: Mapping[str, Any], faults: Faults) -> bool:
+    """Report tables named by a misspelt member, as [design.loper]; tell whether there are any."""
+    before = len(faults.lines)
+    for key in BY_MEMBER:
+        for name, entry in (copied_table(dict(data), key) or {}).items():
+            if isinstance(entry, dict) and ENTRY.isdisjoint(entry) and closest(name, data["machine"]) is not None:
+                faults.unknown((*key, name), data["machine"], "member")
+    return len(faults.lines) > before
 
 
 def _families(section: MechanismSection, data: Mapping[str, Any], faults: Faults) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 from sweep.study.accuracy import AccuracySection
 from sweep.study.design import ReferenceSection
-from sweep.study.file import Section, StudyFile, read_table
+from sweep.study.file import Section, StudyFile, fields, read_table
 from sweep.study.loads import CurveSection, SceneSection
 from sweep.study.locus import FitSection
 from sweep.study.mechanism import MechanismSection, MemberSection, RelationSection, ShaftSection, ToolSection
@@ -89,6 +89,9 @@ class Sections:
 
 def read_sections(file: StudyFile) -> Sections:
     """Read every table by its model; report unknown and missing tables, unknown keys and wrong values."""
+    models = {name: table.model for name, table in TABLES.items() if table.model is not None}
+    file.faults.homes = {key: f"a key of [{name}]" for name, model in models.items() for key in fields(model)}
+    file.faults.homes |= {name: f"a table of its own, [{name}]" for name in TABLES}
     for name in file.data:
         if name not in TABLES:
             file.faults.unknown((name,), [table for table in TABLES if table not in file], "table")
@@ -97,7 +100,5 @@ def read_sections(file: StudyFile) -> Sections:
             file.faults.missing((name,), f"a table [{name}]")
     for name in ("design", "bodies", "loads", "locus", "limits", "cyclogram"):
         file.free_table(name)
-    read: dict[str, Any] = {
-        name: read_table(table.model, name, file) for name, table in TABLES.items() if table.model is not None
-    }
+    read: dict[str, Any] = {name: read_table(model, name, file) for name, model in models.items()}
     return Sections(**read)

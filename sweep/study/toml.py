@@ -30,6 +30,10 @@ _QUOTED = 'a text between quotes, as name = "press", over several lines between 
 _NO_END = ("Illegal character '\\n'", "Found invalid character '\\n'", "Unterminated string", "Expected \"'")
 # Messages of tomllib for words without quotes, and for a unit behind a bare number.
 _BARE_WORDS = ("Invalid value", "Expected newline or end of document after a statement")
+_BARE = 'a text, and a number with its unit, stands between quotes, as in b = "3 mm"'
+# Messages of tomllib for an inline table over several lines, or with a comma at its end.
+_BRACES = ("Invalid initial character for a key part", "Unclosed inline table")
+_ONE_LINE = "a table between braces stands in one line and has no comma at its end"
 # Messages of tomllib for a key or a table that occurs twice.
 _TWICE = ("Cannot overwrite", "Cannot declare", "Duplicate inline")
 
@@ -94,7 +98,11 @@ def _clearer(text: str, message: str) -> str:
         line = int(place[1]) if opened is None else text.count("\n", 0, opened) + 1
         return f"line {line}: a text without its closing quote; allowed: {_QUOTED}"
     if place is not None and message.startswith(_BARE_WORDS):
-        return f'{message}; a text, and a number with its unit, stands between quotes, as in b = "3 mm"'
+        written = f"{text}\n".splitlines()[int(place[1]) - 1].partition("=")[2]
+        word = next(iter(written.split()), "")
+        return f"{message}; {'true and false have small letters' if word in ('True', 'False') else _BARE}"
+    if message.startswith(_BRACES):
+        return f"{message}; {_ONE_LINE}"
     if place is None or not message.startswith(_TWICE):
         return message
     lines = text.splitlines()[: int(place[1])]

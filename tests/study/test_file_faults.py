@@ -46,6 +46,18 @@ def test_words_and_units_without_quotes_are_told_where_quotes_go(line: str, plac
     assert place in message and message.endswith('stands between quotes, as in b = "3 mm"')
 
 
+@pytest.mark.parametrize(
+    ("line", "remedy"),
+    [
+        ("rotatable = True", "true and false have small letters"),
+        ("a = { from = 1,\n to = 2 }", "a table between braces stands in one line and has no comma at its end"),
+    ],
+)
+def test_what_python_would_take_is_told_as_toml_has_it(line: str, remedy: str, tmp_path: Path) -> None:
+    (message,) = faults_of(f"[design]\n{line}\n", tmp_path)
+    assert message.startswith("study.toml:2: ") and message.endswith(remedy)
+
+
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_bytes(b"[study]\nname = '\xff'\n")
     with pytest.raises(StudyError, match="line 2 is no UTF-8 text"):

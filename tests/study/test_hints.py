@@ -8,8 +8,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import sweep
 from sweep.cli.tables import write_table
-from sweep.errors import StoreError, StudyError, closest
+from sweep.errors import StoreError, StudyError, closest, nearest
 from sweep.families import NAMES
 from sweep.quantities.units import SYMBOLS, UnitFault, factor
 from sweep.study import load_study
@@ -34,6 +35,7 @@ PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
         ("thread", ["threading", "loky"], "threading"),
         ("rmp", SYMBOLS, "rpm"),
         ("E1", ["e1", "f1", "g1"], "e1"),
+        ("RSRR", NAMES, "rssr"),
         ("alhpa", PARAMETERS, "alpha"),
         ("crosshead", ["branch"], None),
         ("zzz", OUTPUTS, None),
@@ -45,6 +47,16 @@ PARAMETERS = ["a", "b", "c", "e", "f", "g", "alpha", "branch"]
 )
 def test_hint_is_what_is_meant_or_nothing(word: str, known: list[str], meant: str | None) -> None:
     assert closest(word, known) == meant
+
+
+def test_hint_names_every_stage_and_the_one_member_that_has_a_word() -> None:
+    assert nearest("a", ["a1", "b1", "a2", "b2"]) == ", did you mean a1, a2?"
+    assert nearest("g", ["needle.a", "looper.g"]) == ", did you mean looper.g?"
+
+
+def test_a_function_in_other_spelling_leads_to_ours() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'summarize', did you mean 'summarise'"):
+        sweep.summarize  # noqa: B018
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,21 @@ def test_a_shaft_that_is_missing_is_said_to_be(tmp_path):
         loaded(tmp_path, TEXT.replace('shaft = "upper"\nsense = -1\nturn = "90 deg"\n', ""))
 
 
+@pytest.mark.parametrize("table", ["design", "limits", "bodies", "reference.design"])
+def test_a_table_of_a_misspelt_member_is_one_fault(tmp_path, table):
+    """Its entries were told as missing ones of the member, and the table as a parameter."""
+    text = TEXT.replace("[scene]", f'[{table}.rihgt]\na = "1 mm"\n[scene]')
+    with pytest.raises(StudyError, match=rf"{table}\.rihgt: unknown member.*did you mean 'right'") as caught:
+        loaded(tmp_path, text)
+    assert len(caught.value.faults) == 1
+
+
+def test_a_relation_of_two_kinds_is_told_both(tmp_path):
+    near = '[relations]\nnear = { distance = ["left.c", "right.c"], speed = ["left.c"] }\n'
+    with pytest.raises(StudyError, match="one kind of relation, not distance and speed"):
+        loaded(tmp_path, near + TEXT)
+
+
 def test_shafts_of_a_file_are_read_with_their_units(tmp_path):
     left, right = loaded(tmp_path, TEXT).bare.members
     assert left.mount.shaft.at == (1.0, 2.0, 3.0)

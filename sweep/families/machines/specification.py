@@ -277,7 +277,9 @@ def _relation(
     for key, read in READERS.items():
         if key in table:
             return read(name, table, members, tools)
-    if len(table) != 1 or next(iter(table)) not in RELATION_KINDS:
+    if len(kinds := [key for key in table if key in RELATION_KINDS]) > 1:
+        raise InputError(name, dict(table), f"one kind of relation, not {' and '.join(kinds)}", where)
+    if len(table) != 1 or not kinds:
         raise InputError(name, dict(table), f"one of {choices(' '.join(table), RELATION_KINDS)}", where)
     kind, given = next(iter(table.items()))
     if not isinstance(given, tuple) or not all(isinstance(part, str) for part in given):
