@@ -56,7 +56,7 @@ def test_parameter_above_a_turn_is_refused_with_the_remedy(call):
 
 @pytest.mark.parametrize("phi", [180, [0, 30, 360], np.linspace(0, 360, 50), np.arange(0, 720, 7.5), -90.0])
 def test_grid_in_degrees_is_refused(phi):
-    with pytest.raises(sweep.InputError, match=r'rad, which this does not look like; for degrees write "90 deg", or "phi'):
+    with pytest.raises(sweep.InputError, match=r'rad, which this does not look like; for degrees write "90 deg"'):
         sweep.evaluate("rssr", RADIANS, "psi", phi=phi)
     with pytest.raises(sweep.InputError, match="does not look like"):
         sweep.evaluate("rssr", RADIANS | {"phi": phi}, "psi")
