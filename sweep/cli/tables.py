@@ -105,7 +105,10 @@ def evaluate_table(
 )
 @click.option("--certify", is_flag=True, help="Prove that no peak is missed: err_ columns of maxima are bounds then.")
 @click.option(
-    "--window", type=(float, float), help="Part of the stroke that max_abs_dev covers, two fractions such as 0 0.6."
+    "--window",
+    type=(float, float),
+    metavar="FROM TO",
+    help="Part of the stroke that max_abs_dev covers, two fractions such as 0 0.6.",
 )
 @ANGLES
 @KEEP

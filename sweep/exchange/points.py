@@ -85,8 +85,9 @@ def from_points(family: str, *, tolerance: float = TOLERANCE, **points: Sequence
 
     Examples
     --------
-    >>> found = from_points("rssr", A=[0, 0, 0], axis_A=[1, 0, 0], B=[0, 0, 200], C=[-750, -850, 650],
-    ...                     D=[-400, -850, 0], axis_D=[0, 1, 0])
+    >>> import sweep
+    >>> found = sweep.from_points("rssr", A=[0, 0, 0], axis_A=[1, 0, 0], B=[0, 0, 200], C=[-750, -850, 650],
+    ...                           D=[-400, -850, 0], axis_D=[0, 1, 0])
     >>> round(found.parameters["b"], 6), found.branch
     (1219.631092, -1.0)
     """

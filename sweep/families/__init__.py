@@ -94,8 +94,9 @@ def machine(
 
     Examples
     --------
-    >>> drives = machine({"needle": ["rssr", "guide"], "looper": {"family": "rssr", "tip": [30.0, 0.0, 0.0]}},
-    ...                  {"clearance": {"distance": ["needle.point", "looper.tip"]}})
+    >>> import sweep
+    >>> members = {"needle": ["rssr", "guide"], "looper": {"family": "rssr", "tip": [30.0, 0.0, 0.0]}}
+    >>> drives = sweep.machine(members, {"clearance": {"distance": ["needle.point", "looper.tip"]}})
     >>> drives.parameter_names[:2], "clearance" in drives.pose_names
     (('needle.a1', 'needle.b1'), True)
     """
