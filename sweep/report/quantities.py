@@ -93,10 +93,10 @@ class ShownQuantity:
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Return ``45°`` but ``24.5 mm``; a missing value has no unit."""
+    """Return ``45°`` but ``24.5 mm``, and ``3·10⁻⁷ °``, whose sign would be read as a digit of the power."""
     if not unit or text == "–":
         return text
-    return text + unit if unit == "°" else f"{text}\u00a0{unit}"
+    return text + unit if unit == "°" and "·10" not in text else f"{text}\u00a0{unit}"
 
 
 @lru_cache(maxsize=4096)  # the page of a slider needs the same forty names at every step
