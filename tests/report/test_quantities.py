@@ -84,7 +84,7 @@ def test_values_at_speed_are_those_calculated_by_hand() -> None:
 
 def test_angles_are_shown_in_degrees() -> None:
     assert quantity("swing", "rad").show(math.pi / 4.0) == "45°"
-    assert quantity("err_swing", "rad").show(math.radians(1e-7)) == "1·10⁻⁷°"
+    assert quantity("err_swing", "rad").show(math.radians(1e-7)) == "1·10⁻⁷\u00a0°"
     assert quantity("swing", "rad").show(math.nan) == "–"
 
 
