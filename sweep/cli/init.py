@@ -99,7 +99,7 @@ def init(
 def _write(folder: Path, files: dict[str, str]) -> None:
     """Create a folder, which must not exist, with files."""
     if folder.exists():
-        raise InputError("NAME", folder.name, f"a folder that is not there yet; {folder} is", "command line")
+        raise InputError("NAME", folder.name, f"another name: the folder {folder} exists already", "command line")
     with unwritable(folder):
         folder.mkdir(parents=True)
         for file, text in files.items():

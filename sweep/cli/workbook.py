@@ -9,7 +9,7 @@ import pandas as pd
 from sweep.dataset.files import replacing
 from sweep.dataset.reading import best
 from sweep.dataset.store import load
-from sweep.errors import InputError, extra
+from sweep.errors import InputError, MissingInput, extra
 from sweep.report.dataset import Dataset, read_dataset
 from sweep.report.quantities import quantity
 
@@ -52,7 +52,7 @@ def write_workbook(folder: str | Path, path: str | Path) -> Path:
             for name, frame in tables.items():
                 frame.to_excel(book, sheet_name=name, index=False, freeze_panes=(1, 1))
     except ModuleNotFoundError as error:
-        raise InputError("format", "xlsx", f"the package openpyxl: {extra('excel')}", "export") from error
+        raise MissingInput("openpyxl", f"this package, for format xlsx: {extra('excel')}", "export") from error
     return target
 
 

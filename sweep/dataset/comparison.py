@@ -27,6 +27,7 @@ DEFAULT_SLOWER = 1.5
 LEAST_SECONDS = 5.0
 ROLES = ("optimum", "reference")
 # Number of changed rows that are named.
+INCOMPARABLE = "no row is comparable"
 NAMED = 5
 
 
@@ -104,7 +105,9 @@ class Comparison:
         return VALUES_CHANGED if self.values_changed else SLOWER if self.is_slower else 0
 
     def lines(self) -> list[str]:
-        """Describe the differences in words."""
+        """Describe the differences in words; of two mechanisms there is no more to say than that."""
+        if any(note.endswith(INCOMPARABLE) for note in self.notes):
+            return list(self.notes)
         lines = [*self.notes, f"{how_many(self.rows, 'row')} in both"]
         old, new = ", ".join(self.columns_only_old), ", ".join(self.columns_only_new)
         differences = {
@@ -283,9 +286,7 @@ def _notes(folders: Sequence[Path], plans: Sequence[Mapping[str, Any]]) -> tuple
     ]
     mechanisms = [_mechanism(plan) for plan in plans]
     if all(mechanisms) and mechanisms[0] != mechanisms[1]:
-        notes.insert(
-            0, f"two studies of different mechanisms, {mechanisms[0]} and {mechanisms[1]}: no row is comparable"
-        )
+        notes.insert(0, f"two studies of different mechanisms, {mechanisms[0]} and {mechanisms[1]}: {INCOMPARABLE}")
     elif plans[0].get("study") != plans[1].get("study"):
         words = differences(*(plan.get("chunk_data") or {} for plan in plans))
         notes.append(f"the studies differ in what determines the values: {'; '.join(words) or 'fixed tables'}")

@@ -77,6 +77,7 @@ def store_errors(place: Path) -> Iterator[None]:
     except OSError as error:
         where = error.filename or place
         remedy = "mend that and run again to continue" if error.errno in CLOSED else "run again to continue"
+        remedy = "take another folder" if error.errno in (errno.EEXIST, errno.ENOTDIR) else remedy
         if error.errno == errno.EEXIST and Path(where).is_symlink():  # and its target is no folder
             raise StoreError(f"{where}: a link that leads to no folder; remove it, or take another folder") from error
         text = f"{where}: {error.strerror or error}; finished chunks are kept, {remedy}"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sweep.errors import InputError, extra
+from sweep.errors import MissingInput, extra
 from sweep.evaluation.joints import Part
 from sweep.exchange.scene import extent, frames_of, shown_name
 from sweep.families.base import Array
@@ -38,7 +38,7 @@ def ezdxf_or_refuse() -> Any:
         import ezdxf
         import ezdxf.bbox
     except ImportError as error:
-        raise InputError("format", "dxf", f"the package ezdxf: {extra('cad')}", "export") from error
+        raise MissingInput("ezdxf", f"this package, for format dxf: {extra('cad')}", "export") from error
     return ezdxf
 
 

@@ -16,7 +16,7 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sweep.errors import InputError, LinksweepError, extra
+from sweep.errors import InputError, LinksweepError, MissingInput, extra
 from sweep.exchange.export import FORMATS, export
 from sweep.explore.cells import cells, design_of
 from sweep.explore.changes import dragged, improve, problem_in_hand
@@ -184,8 +184,7 @@ def _needed() -> None:
         import starlette  # noqa: F401
         import uvicorn  # noqa: F401
     except ImportError as error:
-        needed = f"the package {error.name}: {extra('explore')}"
-        raise InputError("explore", "a page", needed, "explore") from error
+        raise MissingInput(str(error.name), f"this package, for the page: {extra('explore')}", "explore") from error
 
 
 async def _json_body(request: Request) -> dict[str, Any]:

@@ -173,8 +173,8 @@ def read_dataset(folder: Path) -> Dataset:
     folder = files.located(folder)
     plan = files.trusted_plan(folder)
     if plan is None:
-        allowed = f"a dataset folder, with a readable {files.PLAN} (sweep run makes one)"
-        raise InputError("folder", str(folder), allowed, "report")
+        needed = f"a dataset folder, with a readable {files.PLAN} in {files.beside(folder)} (sweep run makes one)"
+        raise InputError("folder", str(folder), needed, "report")
     if not store.is_complete(folder):
         raise InputError("folder", str(folder), "a complete dataset; run the study again to resume it", "report")
     if not plan.get("complete"):  # killed after the last chunk, before the totals were written

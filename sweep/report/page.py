@@ -273,7 +273,7 @@ def write_comparison(folders: Sequence[Path], out: Path) -> Path:
     parameters = tuple(meanings)
     for folder, entry in zip(folders, designs, strict=True):
         if not meanings.items() <= {p.name: p.text for p in entry.family.parameters}.items():
-            allowed = f"a dataset of the mechanism of {folders[0]}: {', '.join(parameters)}"
+            allowed = f"a dataset of the mechanism of {folders[0]}, with the parameters {', '.join(parameters)}"
             raise InputError("folder", str(folder), allowed, "report")
     first = designs[0].design
     rows = [row_of(data.study, first | {name: entry.design[name] for name in parameters}) for entry in designs]

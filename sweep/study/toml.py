@@ -74,7 +74,8 @@ def toml_text(file: Path) -> str:
     try:
         return file.read_bytes().decode("utf-8-sig")
     except OSError as error:
-        raise _fault(file, f"cannot be read: {error.strerror}") from None
+        remedy = "; a study is a study.toml, or the folder that holds one" if file.name == "study.toml" else ""
+        raise _fault(file, f"cannot be read: {error.strerror}{remedy}") from None
     except UnicodeDecodeError as error:
         line = error.object[: error.start].count(b"\n") + 1
         raise _fault(file, f"line {line} is no UTF-8 text") from None

@@ -259,6 +259,18 @@ def test_cyclogram_of_a_machine_is_whole_on_a_telephone(browser, tmp_path):
         assert page.locator("#cyclogram .table").evaluate("part => part.scrollWidth <= part.clientWidth")
 
 
+@pytest.mark.parametrize(("section", "table"), [("robustness", "named"), ("limits", "")])
+def test_narrow_tables_leave_out_columns_but_no_rows(browser, tmp_path, section, table):
+    """The third of five rows was hidden with the third of five columns: of a slider-crank made, its stroke."""
+    rows = "".join(f"<tr>{f'<td>{row}</td>' * 5}</tr>" for row in range(5))
+    style = (Path(sweep.__file__).parent / "templates" / "report.css").read_text(encoding="utf-8")
+    page = f'<style>{style}</style><section id="{section}"><table class="{table}">{rows}</table></section>'
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    with opened(browser, (tmp_path / "page.html").as_uri(), 390) as narrow:
+        assert [row.is_visible() for row in narrow.locator("tr").all()] == [True] * 5
+        assert sum(cell.is_visible() for cell in narrow.locator("tr").first.locator("td").all()) == 4
+
+
 def test_without_scripts_the_answer_is_whole(address, browser):
     with opened(browser, address, java_script_enabled=False) as page:
         assert page.locator("#live").is_hidden()
