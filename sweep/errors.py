@@ -247,10 +247,7 @@ SYNONYMS = {
     "stop": ("to",),
     "from": ("min",),
     "to": ("max",),
-    "lower": ("min", "from"),
-    "upper": ("max", "to"),
     "step": ("count",),
-    "steps": ("count",),
     "num": ("count",),
 }
 

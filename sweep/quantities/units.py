@@ -124,6 +124,13 @@ def split(text: str, internal: str) -> tuple[float, str]:
     return float(match[1]), match[2]
 
 
+def unquoted(value: object, kind: str = "float_type") -> str:
+    """Say that a number or a truth value stands without quotes, where a study has it in quotes."""
+    bare = isinstance(value, str) and (match := _NUMBER.fullmatch(value.strip())) is not None and not match[2]
+    fits = bare if kind in ("float_type", "int_type") else kind == "bool_type" and value in ("true", "false")
+    return ", without quotes" if fits else ""
+
+
 def read(text: str, internal: str) -> float:
     """Read a text such as "7000 rpm" in the internal unit.
 

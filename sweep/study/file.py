@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,7 +27,6 @@ from sweep.quantities import units
 Key: TypeAlias = tuple[str | int, ...]
 
 _LONGEST_VALUE = 60
-_NUMBER = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*")
 
 
 class Faults:
@@ -46,7 +44,7 @@ class Faults:
         self._files, self._places = files, places
         self._misspelt: set[Key] = set()
         self._known: int | None = None  # faults that were there before a mechanism was guessed
-        self.homes: dict[str, str] = {}  # where a key belongs, for one that stands in another table
+        self.homes: dict[str, str] = {}  # words on where a key belongs, for one that stands in another table
         self._fits = True
 
     def guess(self) -> None:
@@ -80,12 +78,11 @@ class Faults:
 
     def unknown(self, key: Key, known: Iterable[str], what: str = "key") -> None:
         """Report an unknown key, with the closest known one."""
-        names = list(known)
-        guess = closest(str(key[-1]), names)
+        names, word = list(known), str(key[-1])
+        guess = closest(word, names)
         if guess is not None:
             self._misspelt.add((*key[:-1], guess))
-        home = self.homes.get(str(key[-1])) if guess is None and len(key) < 3 else None
-        self.unknown_name(key, what, choices(str(key[-1]), names) + (f"; {key[-1]} is {home}" if home else ""))
+        self.unknown_name(key, what, choices(word, names) + ("" if guess or len(key) > 2 else self.homes.get(word, "")))
 
     def unknown_name(self, key: Key, what: str, allowed: str) -> None:
         """Report a key that should name a known item."""
@@ -318,16 +315,9 @@ def _validated(model: type[S], raw: Mapping[str, Any], key: Key, faults: Faults)
             if item["type"] == "extra_forbidden":
                 faults.unknown((*key, *place), fields(_reached(model, place[:-1])[0]))
             else:
-                context = item.get("ctx", {}) if item["type"] == QUANTITY else {}
-                words = context.get("words") or f"{_reached(model, place)[1]}{unquoted(item['input'], item['type'])}"
-                faults.value((*key, *place), item["input"], words)
+                words = _reached(model, place)[1] + units.unquoted(item["input"], item["type"])
+                faults.value((*key, *place), item["input"], item["ctx"]["words"] if item["type"] == QUANTITY else words)
         return model.model_validate({name: value for name, value in raw.items() if name not in bad})
-
-
-def unquoted(value: object, kind: str = "float_type") -> str:
-    """Say that a number or a truth value stands without quotes, where a study has it in quotes."""
-    numeric = kind in ("float_type", "int_type") and isinstance(value, str) and _NUMBER.fullmatch(value)
-    return ", without quotes" if numeric or (kind == "bool_type" and value in ("true", "false")) else ""
 
 
 def fields(model: type[Section]) -> dict[str, Any]:

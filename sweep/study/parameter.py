@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 from sweep.effects.loads import GRAM
 from sweep.families.base import Parameter
 from sweep.quantities import units
-from sweep.study.file import Count, Faults, Key, Number, Section, holds, read_section, unquoted
+from sweep.study.file import Count, Faults, Key, Number, Section, holds, read_section
 from sweep.study.space import Axis
 
 Entry: TypeAlias = Axis | float
@@ -79,7 +79,7 @@ def _read_plain(p: Parameter, raw: object, key: Key, faults: Faults) -> float | 
     if bare is None or internal != "1":
         # An integer in the file may exceed the range of a float.
         shown = bare if bare is not None and abs(bare) <= units.LARGEST else None
-        faults.value(key, raw, forms(p, shown) + (unquoted(raw) if internal == "1" else ""))
+        faults.value(key, raw, forms(p, shown) + (units.unquoted(raw) if internal == "1" else ""))
         return None
     return _read_fixed(p, {"value": raw}, key, faults)
 

@@ -90,8 +90,8 @@ class Sections:
 def read_sections(file: StudyFile) -> Sections:
     """Read every table by its model; report unknown and missing tables, unknown keys and wrong values."""
     models = {name: table.model for name, table in TABLES.items() if table.model is not None}
-    file.faults.homes = {key: f"a key of [{name}]" for name, model in models.items() for key in fields(model)}
-    file.faults.homes |= {name: f"a table of its own, [{name}]" for name in TABLES}
+    homes = {key: f"; {key} is a key of [{name}]" for name, model in models.items() for key in fields(model)}
+    file.faults.homes = homes | {name: f"; {name} is a table of its own, [{name}]" for name in TABLES}
     for name in file.data:
         if name not in TABLES:
             file.faults.unknown((name,), [table for table in TABLES if table not in file], "table")
