@@ -59,7 +59,8 @@ class Moment(Relation, ABC):
     def read(self, machine: Machine, designs: Any, places: Places, wanted: frozenset[str]) -> Columns:
         """Evaluate all outputs at these angles, each (n,), ``status``, and ``steep`` (`steepness`).
 
-        With complex designs the places move too, to first order.
+        ``steep NAME`` is that of an output which another place determines too.  With complex designs the places move
+        too, to first order.
         """
 
     def step(self, machine: Machine) -> Step:
@@ -90,9 +91,12 @@ class Moment(Relation, ABC):
             parts = [block(designs[k : k + BLOCK], wanted, samples) for k in range(0, max(len(designs), 1), BLOCK)]
             found: Columns = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
             steep = np.asarray(found.pop("steep"), np.float64)
+            steeper = {key: found.pop(key) for key in list(found) if key.startswith("steep ")}
             if accuracy.target is not None:
-                rounded = TANGENT * steep * np.abs(designs).max(axis=1, initial=0.0)
-                found |= {f"err_{key}": np.maximum(np.abs(found[key]) * accuracy.target, rounded) for key in wanted}
+                size = TANGENT * np.abs(designs).max(axis=1, initial=0.0)
+                for key in wanted:
+                    rounded = size * np.fmax(steep, steeper.get(f"steep {key}", 1.0))
+                    found[f"err_{key}"] = np.maximum(np.abs(found[key]) * accuracy.target, rounded)
             return found
 
         def cost(accuracy: Accuracy) -> float:

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from sweep.families.machines.machine import Machine
 
 PARALLEL = 1e-6  # share of the scarf vector below which its part normal to the needle gives no direction
+AT_LOW = ("lag", "gauge", "free")  # outputs that change with the place where the needle is lowest
+BESIDE = 1e-6  # rad: a needle on a cam without dwell moves so little there that its place is known to 1e-9 only
 MEET = 1e-9  # rad of the tip's travel: axes closer than this meet, the accuracy of a minimum's place by quick poses
 TEXTS = {
     "lag": ("rad", "crank angle from the needle's lowest point to the passage"),
@@ -261,8 +263,12 @@ class Taking(crossings.Moment):
             angles |= now  # an extremum's value does not depend on the motion of its place
         del angles["top"]
         names = ["across", "side", "height", "dacross", "depth", "speed", *(["gap"] if "near" in angles else [])]
+        lowest = [f"{name}_{key}" for key in AT_LOW if f"{name}_{key}" in wanted]
+        if lowest:
+            angles |= {"before": angles["low"] - BESIDE, "behind": angles["low"] + BESIDE}
+            names.append("ddepth")
         found = crossings.outputs_at(machine, designs, angles, [f"{name}_{what}" for what in names])
-        across, side, height, turned, depth, speed, *gap = (found[f"{name}_{what}"] for what in names)
+        across, side, height, turned, depth, speed, *others = (found[f"{name}_{what}"] for what in names)
         rise = depth["low"] - depth["at"]
         values = {
             "lag": turned_back(angles["at"] - angles["low"]),
@@ -282,14 +288,17 @@ class Taking(crossings.Moment):
             least, most = low.max(axis=1), high.min(axis=1)
             values |= {"least": least, "most": most, "room": np.minimum(rise - least, most - rise)}
             status[(status == st.OK) & (np.real(least) > np.real(most))] = st.NO_WINDOW
-        if gap:
-            free, radii = gap[0]["near"], sum(body.radius for body in self.gap.bodies)
+        if "near" in angles:
+            free, radii = others[0]["near"], sum(body.radius for body in self.gap.bodies)
             # Axes that meet do so for every neighbouring design: the least gap is constant, and its slope is zero.
             values["free"] = np.where(np.real(free) + radii > MEET * np.real(speed["near"]), free, np.real(free))
         status[np.real(side["at"]) <= 0.0] = st.WRONG_SIDE
         columns: Columns = {f"phi_{name}": angles["at"], f"count_{name}": places["count"], "status": status}
         fast = np.fmax(np.real(speed["at"]), np.real(speed["after"]))
         columns["steep"] = crossings.steepness(fast, turned["at"], turned["after"])
+        if lowest:
+            bend = (others[-1]["behind"] - others[-1]["before"]) / (2.0 * BESIDE)
+            columns |= {f"steep {key}": crossings.steepness(speed["low"], bend) for key in lowest}
         return columns | {f"{name}_{key}": value for key, value in values.items()}
 
 

@@ -104,27 +104,6 @@ def test_of_two_lowest_places_the_last_one_counts_wherever_the_machine_stands(tu
     assert got["a_gauge"] == pytest.approx(-AT[1] - ARM * turned / math.hypot(1.0, turned), abs=1e-11)
 
 
-def test_of_a_needle_that_stands_at_its_lowest_place_the_end_of_that_counts():
-    """A cam turns the crank of the needle to 10 deg before its lower dead point, and holds it there for 1 rad."""
-    cam = {"lift": 1.2, "rise": 1.5, "dwell": 1.0, "fall": 1.5, "start": 0.2, "r0": 3.0, "c": 5.0, "e": 6.0}
-    leaves = 0.2 + 1.5 + 1.0
-    held = sweep.evaluate("cam_lever", cam | {"law": 1.0, "branch": -1.0}, ["psi"], phi=[leaves])["psi"][0]
-    needle = {f"needle.{key}1": value for key, value in cam.items()} | {"needle.law1": 1.0, "needle.branch1": -1.0}
-    needle |= {f"needle.{key.removeprefix('needle.')}2": x for key, x in DESIGN.items() if key.startswith("needle.")}
-    looper = {key: x for key, x in DESIGN.items() if key.startswith("looper.")} | {"looper.offset": 0.7}
-    members = {"needle": {"chain": ["cam_lever", "guide"]}}
-    got = found(
-        machine_of(at=(AT[0] + 6.0, 10.0, AT[2]), members=members), ["a_gauge", "phi_a", "a_lag"],
-        needle | looper | {"needle.offset2": math.radians(170.0) - held},
-    )  # fmt: skip
-    turned = SHARE * math.cos(leaves + 0.7)
-    gauge = CRANK * math.sin(math.radians(170.0)) - 10.0 - ARM * turned / math.hypot(1.0, turned)
-    assert got["status"] == st.OK
-    # the end of the dwell is known to the rounding of an angle, some 1e-14, and the looper is slower than 20 per radian
-    assert got["a_gauge"] == pytest.approx(gauge, abs=1e-11)
-    assert got["a_lag"] == pytest.approx(got["phi_a"] - leaves, abs=1e-12)
-
-
 def test_a_tip_that_touches_the_line_is_undecided():
     forward = found(machine_of(sense=-1), ["a_reach"])["a_reach"]
     backward = found(machine_of(), ["a_reach"])["a_reach"]

@@ -131,6 +131,45 @@ def test_least_gap_over_the_turn_is_that_of_the_table():
         assert min(apart, 2.0 * math.pi - apart) < 1e-6
 
 
+def lowest_by_cam(dwell, law):
+    """A cam turns the crank of the needle to 10 deg before its lower dead point, holds it there and turns it back.
+
+    Machine, design, crank angle at which the crank turns back, and the gauge.
+    """
+    cam = {"lift": 1.2, "rise": 1.5, "dwell": dwell, "fall": 1.5, "start": 0.2, "r0": 3.0, "c": 5.0, "e": 6.0}
+    leaves = 0.2 + 1.5 + dwell
+    held = sweep.evaluate("cam_lever", cam | {"law": law, "branch": -1.0}, ["psi"], phi=[leaves])["psi"][0]
+    needle = {f"needle.{key}1": value for key, value in cam.items()} | {"needle.law1": law, "needle.branch1": -1.0}
+    needle |= {
+        f"needle.{key.removeprefix('needle.')}2": x for key, x in hand_made.DESIGN.items() if key.startswith("needle.")
+    }
+    looper = {key: x for key, x in hand_made.DESIGN.items() if key.startswith("looper.")} | {"looper.offset": 0.7}
+    machine = hand_made.machine_of(
+        at=(hand_made.AT[0] + 6.0, 10.0, hand_made.AT[2]), members={"needle": {"chain": ["cam_lever", "guide"]}}
+    )
+    turned = hand_made.SHARE * math.cos(leaves + 0.7)
+    gauge = hand_made.CRANK * math.sin(math.radians(170.0)) - 10.0 - hand_made.ARM * turned / math.hypot(1.0, turned)
+    return machine, needle | looper | {"needle.offset2": math.radians(170.0) - held}, leaves, gauge
+
+
+def test_of_a_needle_that_stands_at_its_lowest_place_the_end_of_that_counts():
+    machine, design, leaves, gauge = lowest_by_cam(1.0, 1.0)
+    got = hand_made.found(machine, ["a_gauge", "phi_a", "a_lag"], design)
+    assert got["status"] == st.OK
+    # the end of the dwell is known to the rounding of an angle, some 1e-14, and the looper is slower than 20 per radian
+    assert got["a_gauge"] == pytest.approx(gauge, abs=1e-11)
+    assert got["a_lag"] == pytest.approx(got["phi_a"] - leaves, abs=1e-12)
+
+
+@pytest.mark.parametrize("law", [1.0, 2.0, 3.0])
+def test_errors_of_a_needle_that_a_cam_turns_back_without_dwell_are_those_of_its_lowest_place(law):
+    """Its slope goes with the square of the angle there: its rounding hid 1e-9 rad, its errors 1e-12."""
+    machine, design, leaves, gauge = lowest_by_cam(0.0, law)
+    got = sweep.summarise(machine, design, ["a_gauge", "phi_a", "a_lag"], accuracy=1e-12).iloc[0]
+    assert abs(got["a_gauge"] - gauge) <= got["err_a_gauge"] <= 1e-4
+    assert abs(got["a_lag"] - (got["phi_a"] - leaves)) <= got["err_a_lag"] <= 1e-5 and got["err_phi_a"] < 1e-10
+
+
 def test_a_dip_beside_the_end_that_no_sample_shows_is_the_least():
     """The slider is 0.7 rad earlier in its turn at each sample: samples only fall, and between them it was folded."""
     mechanism = family("slider_crank")
