@@ -18,6 +18,7 @@ from sweep.reductions.resolution import denser
 from sweep.reductions.rounding import shaken
 from sweep.reductions.sampling import DESIGN_STATUS, blocks, pose_columns, sample_turn, variable
 
+UNSEEN = 4.0  # rounding of a pose per change by rounded inputs, at most: they may cancel; directions are no inputs
 START, LIMIT = 256, 16384  # first number of samples, and the last one before a design is given up
 
 
@@ -121,7 +122,8 @@ def _root(
     slope = np.abs((high - low) / (right - left))
     phi = zeros(off, left, right)
     left_over = np.abs(off(np.arange(phi.size), phi))
-    rounding = 8.0 * EPS * (np.abs(event.level) + left_over + slope) + shaken(family, designs, phi, event.of)
+    rounding = 8.0 * EPS * (np.abs(event.level) + left_over + slope)
+    rounding += UNSEEN * shaken(family, designs, phi, event.of)
     known = left_over + rounding
     err = known / np.maximum(slope, 1e-300) + 8.0 * EPS
     # Beside an extremum the curve is flatter than between the samples: it has to leave its rounding on both sides.
