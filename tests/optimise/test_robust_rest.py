@@ -6,6 +6,7 @@ The six-bar, its samples and its limits are those of ``tests/optimise/test_settl
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -82,6 +83,9 @@ def test_scatter_of_a_dip_at_the_edge_is_that_of_its_distance_from_the_edge(draw
     # Parabolas through samples leave out 1e-6 of the stroke, 1e-4 of the window.
     assert dip_of(x) == pytest.approx(0.0, abs=2e-4) and found == pytest.approx(np.linalg.norm(slopes), rel=0.02)
     assert edge_deviation(PROBLEM, drawing.design, sigma, LIMITS[2]) == 0.0
+    # The same said of the rest of the turn.
+    turn, angle = replace(PROBLEM, window=(0.0, 0.99)), Limit("window_angle", None, math.tau - REST)
+    assert edge_deviation(turn, drawing.design, sigma, angle) == pytest.approx(found, rel=1e-6)
 
 
 def test_margins_of_a_rest_leave_it_whole_where_its_scatter_jumps_from_top_to_top(drawing: Result) -> None:

@@ -148,7 +148,7 @@ def edge_deviation(problem: Problem, design: Array, sigma: Array, limit: Limit) 
     centre, reach = design[varied], 0.5 * sigma[varied]
     fixed = {name: float(x) for k, (name, x) in enumerate(zip(names, design, strict=True)) if k not in varied}
     # Where the limit is missed, tops and dips may use up nothing of the angle.
-    short = replace(limit, minimum=limit.minimum and math.tau, maximum=limit.maximum and 0.0)
+    short = replace(limit, minimum=limit.minimum and math.tau, maximum=limit.maximum and -math.tau)
     own = Problem(
         problem.family, tuple(names[k] for k in varied), centre - reach, centre + reach, fixed, names[varied[0]],
         (short,), problem.window,
