@@ -15,7 +15,7 @@ from sweep.effects.scene import Scene, take_over
 from sweep.families.base import Array, Columns, Output, Turn
 from sweep.families.poses import chosen
 from sweep.families.reduction import REDUCTIONS
-from sweep.numerics.even_grids import on_first_grid
+from sweep.numerics.even_grids import beyond, on_first_grid
 from sweep.numerics.records import Indices
 
 RESOLVED = 1e-9
@@ -88,7 +88,9 @@ def reductions(
     turn_extremes(np.ascontiguousarray(values), np.full(n, known), largest, phi_largest, least, phi_least, rms, missed)
     status[(status == st.OK) & ~(missed < limit)] = st.NOT_CONVERGED
     size = np.maximum(np.abs(largest), np.abs(least))
-    # The curve is as accurate as the steady state that it comes from.
+    # The curve is as accurate as the steady state that it comes from, and lacks all harmonics of a narrow peak above
+    # those of the grid, which fold back into its highest ones.
+    missed = np.fmax(missed, np.divide(2.0 * beyond(values), size, out=np.zeros(n), where=size > 0.0))
     err, early = (missed + known) * size, np.sqrt(missed + known)
     phi_largest, phi_least = np.mod(phi_largest, TWO_PI), np.mod(phi_least, TWO_PI)  # just before 0 rounds to 2 pi
     # Of a top and a bottom as far from zero within their errors the first in the turn counts, 0 within its error too.
@@ -99,9 +101,9 @@ def reductions(
         "min": (least, err),
         "max_abs": (size, err),
         # The slope's zero is as accurate as the square root of the value's error.
-        "phi_max_abs": (np.where(upward, phi_largest, phi_least), np.full(n, np.sqrt(known))),
-        "phi_max": (phi_largest, np.full(n, np.sqrt(known))),
-        "phi_min": (phi_least, np.full(n, np.sqrt(known))),
+        "phi_max_abs": (np.where(upward, phi_largest, phi_least), early),
+        "phi_max": (phi_largest, early),
+        "phi_min": (phi_least, early),
         "range": (largest - least, 2.0 * err),
         "rms": (rms, err),
     }
