@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from pathlib import Path
 
 import click
@@ -97,13 +98,17 @@ def init(
 
 
 def _write(folder: Path, files: dict[str, str]) -> None:
-    """Create a folder, which must not exist, with files."""
+    """Create a folder, which must not exist, with all files or not at all."""
     if folder.exists():
         raise InputError("NAME", folder.name, f"another name: the folder {folder} exists already", "command line")
     with unwritable(folder):
         folder.mkdir(parents=True)
-        for file, text in files.items():
-            (folder / file).write_text(text, encoding="utf-8")
+        try:
+            for file, text in files.items():
+                (folder / file).write_text(text, encoding="utf-8")
+        except OSError:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
 
 
 def _machine(members: tuple[str, ...]) -> Machine | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -200,6 +201,20 @@ def test_init_refuses_what_it_cannot_write(tmp_path):
     wrong = call("init", "second", "--family", "rsrs", "--into", tmp_path)
     assert wrong.exit_code == 2 and "did you mean 'rssr'" in wrong.output
     assert not (tmp_path / "second").exists()
+
+
+def test_init_on_a_full_disk_leaves_nothing(tmp_path, monkeypatch):
+    """A folder with half of the schema was left, so that the name was taken."""
+
+    def full(path, text, encoding):
+        path.write_bytes(text[:9].encode())
+        if path.name == "study.schema.json":
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    result = CliRunner().invoke(main, ["init", "press", "--family", "rssr", "--into", str(tmp_path)])
+    assert result.exit_code == 74 and "No space left on device" in result.output
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_init_in_a_project_names_the_schema_that_all_its_studies_share(tmp_path):

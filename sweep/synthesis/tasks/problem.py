@@ -126,7 +126,8 @@ class Solution:
             ("unknowns", self.unknowns), ("mechanism", self.mechanism), ("residuals", self.equations),
             ("slacks", self.limits),
         ):  # fmt: skip
-            lines.append(f"  {title}: " + ", ".join(f"{name} = {value:.9g}" for name, value in entries.items()))
+            words = ", ".join(f"{name} = {value:.9g}" for name, value in entries.items())
+            lines += [f"  {title}: {words}"] if entries else []
         return "\n".join(lines)
 
 

@@ -382,7 +382,7 @@ class Cells {
       const [edge, anchor] = k === 0 ? [0, "start"] : k === this.rails.length - 1 ? [RAILS.wide, "end"] : [x, "middle"];
       const label = svg("text", { x: edge, y: top, "text-anchor": anchor }, host);
       // Names of members begin alike, outputs end alike.
-      const brief = page.swept.includes(name) ? `…${symbol.slice(-11)}` : `${symbol.slice(0, 11)}…`;
+      const brief = page.swept.includes(name) ? `…${symbol.slice(-11)}` : `${symbol.slice(0, 10)}…${symbol.match(/[\d₀-₉]?$/)[0]}`;
       label.textContent = symbol.length > 12 ? brief : symbol;
       svg("title", {}, label).textContent = symbol;
       svg("text", { x, y: RAILS.high - 6, "text-anchor": "middle" }, host).textContent = short(ends[0], 3);
