@@ -114,7 +114,7 @@ def split(text: str, internal: str) -> tuple[float, str]:
     UnitFault
         if there is no number, or no unit where one is needed, or if the number is beyond 1e100.
     """
-    match = _NUMBER.fullmatch(text.strip())
+    match = _NUMBER.fullmatch(text.strip().replace("\u2212", "-"))  # a minus as reports print it
     if match is not None and match[2].startswith(","):
         raise UnitFault(f"a decimal point, no comma; {example(internal)}")
     if match is None or not match[2] or not math.isfinite(float(match[1])):

@@ -258,8 +258,9 @@ def _file(
         if column not in columns:
             faults.value((*key, "columns", k), column, f"columns of the file: {choices(column, columns)}")
             return None
-    if len(columns) < 2 or len(table) > MOST_POINTS:
-        faults.value(place, name, f"two columns, angle and load, of at most {MOST_POINTS} rows")
+    if len(columns) < 2 or len(table) > MOST_POINTS or any(map(units.unquoted, columns)):
+        form = "two columns between commas, angle and load, below a line with their names"
+        faults.value(place, name, f"{form}, of at most {MOST_POINTS} rows")
         return None
     pair = [table.iloc[:, columns.index(column)] for column in section.columns or columns[:2]]
     try:

@@ -224,6 +224,14 @@ def test_faults_of_bodies_and_loads_name_the_place_and_what_is_right(tmp_path, t
     assert line in faults(tmp_path, text, {"g.csv": "a,b\n0,x\n90,2\n"})
 
 
+@pytest.mark.parametrize("content", ["0,0\n90,-5\n180,0\n", "angle;force\n0;0\n90;-5\n"])
+def test_a_file_of_loads_needs_names_between_commas(tmp_path, content):
+    """The first of its points was taken for the names, and lost."""
+    entry = "[loads]\ntool_force2 = { file = 'g.csv', unit = 'N' }\n"
+    told = faults(tmp_path, HEAD + "[bodies]\n" + BODIES + entry, {"g.csv": content})
+    assert "two columns between commas, angle and load, below a line with their names" in told
+
+
 def test_missing_mass_is_told_without_the_gram_of_tables_in_tonnes(tmp_path):
     fault = str(faults(tmp_path, HEAD + "[bodies]\n" + BODIES.replace('m_crank2 = "10 g"\n', "")))
     assert "mass of the crank" in fault and "a gram is" not in fault

@@ -16,7 +16,7 @@ from sweep.errors import StudyError
 from sweep.families.names import negative
 from sweep.optimise import Problem, minimise
 from sweep.optimise.manufacture.tolerance import sensitivities
-from sweep.quantities.units import UnitFault, factor
+from sweep.quantities.units import UnitFault, factor, read
 from sweep.report.quantities import quantity
 from sweep.study import Limit, OptimiseSettings, load_study
 
@@ -177,6 +177,10 @@ def test_designs_of_a_time_ratio_have_it(tmp_path) -> None:
     assert len(found) > 5
     ratio = sweep.summarise("rssr", found[["a", "b", "c", "e", "f", "g", "alpha", "branch"]], ["stroke_ratio"])
     assert ratio["stroke_ratio"].to_numpy() == pytest.approx(1.1, abs=1e-9)
+
+
+def test_a_minus_as_reports_print_it_is_one() -> None:
+    assert read("\u22124 mm", "mm") == -4.0
 
 
 @pytest.mark.parametrize(
