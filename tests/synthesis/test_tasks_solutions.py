@@ -13,6 +13,7 @@ from sweep.synthesis.tasks import (
     Position,
     Task1,
     Task2,
+    Task5,
     adjustments,
     solve,
 )
@@ -177,6 +178,31 @@ def test_engineering_method_beats_every_mechanism_of_a_dense_search():
     dense = sweep.summarise("rssr", frame[list(RSSR)], "max_abs_d2psi", samples=180)["max_abs_d2psi"]
     assert len(dense) > 200
     assert solution.objective <= dense.min() * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        EngineeringMethod(
+            0.7559108123501284, 2.98649576763178, 1.0, 0.8972988942744877, 0.7806483068094369, (-2.0, 2.0)
+        ),
+        pytest.param(
+            Task5(
+                -1.1826634798211146, 3.473160035564651, 1.0, 0.4495798815470673, 0.9494722266569211, (-2.0, 2.0), 1.0
+            ),
+            marks=pytest.mark.long,
+        ),
+    ],
+)
+def test_mechanism_on_its_dead_point_is_no_solution(task):
+    """By 180 poses alone it was the best one: between two of them the acceleration has no bound."""
+    found = [s for s in solve(task, samples=1) if s.feasible]
+    number = "1" if isinstance(task, Task5) else ""
+    made = pd.DataFrame([[s.mechanism[name + number] for name in RSSR] for s in found], columns=list(RSSR))
+    turns = sweep.summarise("rssr", made, ["max_abs_d2psi"], accuracy=1e-9)
+    assert len(made) > 1 and (turns["status"] == st.OK).all()
+    if not number:
+        np.testing.assert_allclose([s.objective for s in found], turns["max_abs_d2psi"], rtol=1.1e-4)
 
 
 def test_engineering_method_keeps_the_joint_in_its_box():

@@ -23,8 +23,10 @@ from sweep.synthesis.tasks.problem import Candidates, SynthesisTask, Unknown, tu
 Number: TypeAlias = Array | float
 
 POSES = 180
+MISSED = 1e-4  # share of the largest magnitude by which a peak is missed; samples with their tops are good to 1e-5
 RSSR = family("rssr")
 _EXACT = Accuracy(target=1e-10)
+PEAK = Accuracy(target=0.1 * MISSED)
 
 
 @lru_cache(maxsize=8)
@@ -51,8 +53,15 @@ def designs_on_locus(
 
 
 def acceleration(designs: Array) -> Array:
-    """Return the acceleration analogue of the rocker over a turn, (n, POSES)."""
-    return with_tops(RSSR.values(designs, turn(), "d2psi")[0])
+    """Return the acceleration analogue of the rocker over a turn with its largest magnitude, as `with_peak` does."""
+    true = outputs_of(designs, ["max_abs_d2psi"], PEAK)["max_abs_d2psi"]
+    return with_peak(with_tops(RSSR.values(designs, turn(), "d2psi")[0]), true)
+
+
+def with_peak(curve: Array, peak: Array) -> Array:
+    """Add a column to samples of a turn, (n, m): a peak, (n,), that they miss, as they do beside a dead point; or 0."""
+    seen = np.abs(peak) <= (1.0 + MISSED) * np.abs(curve).max(axis=1)  # nan, where the crank does not turn, stays
+    return np.column_stack([curve, np.where(seen, 0.0, peak)])
 
 
 def with_tops(curve: Array) -> Array:

@@ -13,13 +13,17 @@ from sweep.evaluation.summaries import design_outputs
 from sweep.families import slotted
 from sweep.families.base import Accuracy, Angles, Array, floats
 from sweep.synthesis.tasks.crank_rocker import (
+    PEAK,
+    POSES,
     RSSR,
     LocusTask,
     Number,
     broadcast_columns,
     named,
+    outputs_of,
     pressure_limit,
     turn,
+    with_peak,
     with_tops,
 )
 from sweep.synthesis.tasks.problem import Candidates, Unknown, ranges, turning
@@ -98,8 +102,10 @@ class Task5(LocusTask):
             psi, dpsi, d2psi = RSSR.values(designs, Angles.of(phi1[:, None] + dphi), "psi", "dpsi", "d2psi")
             return slot(a2, e2, t1[:, None] + self.kappa * (psi - psi1[:, None])), dpsi, d2psi
 
-        here, dpsi, d2psi = rho_at(turn().phi)
-        curve = with_tops(self.kappa * d2psi * here.first + dpsi * dpsi * here.second)
+        peak = outputs_of(designs, ["phi_max_abs_d2psi"], PEAK)["phi_max_abs_d2psi"] - phi1
+        here, dpsi, d2psi = rho_at(np.column_stack([np.broadcast_to(turn().phi, (len(phi1), POSES)), peak]))
+        d2rho = self.kappa * d2psi * here.first + dpsi * dpsi * here.second
+        curve = with_peak(with_tops(d2rho[:, :-1]), d2rho[:, -1])
         start = slot(a2, e2, t1[:, None]).rho[:, 0]
         equations = {
             f"rho at position {k}": (rho_at(np.array([[p.dphi]]))[0].rho[:, 0] - start - p.drho) / abs(self.rho0)
