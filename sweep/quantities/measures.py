@@ -229,7 +229,9 @@ def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[
         case kinds.LimitPosition(kind=kind):
             ratio: Inner = "ratio" if kind == "stroke_ratio" else "same"
             return Measure(name, LIMIT_KINDS[kind], (curve(family, quantity.of),), ratio, cycles=quantity.cycles)
-        case kinds.Reduced(reduction=reduction, extreme=True):
+        case kinds.Reduced(reduction=reduction, extreme=True) if isinstance(
+            family.domain, Turn
+        ) or not reduction.kind.startswith("phi"):
             inside = window if family.pose_output[quantity.of].windowed else None
             # A vector's length has no slope at zero: its largest value is bounded by both signs, like a magnitude.
             of_vector = {f"{quantity.of}_{axis}" for axis in "xyz"} <= family.pose_output.keys()
@@ -248,8 +250,8 @@ def _measure(family: Family, name: str, quantity: kinds.Quantity, window: tuple[
         case kinds.OwnOutput(of_part=True):
             raise InputError("output", name, "an output that changes steadily", f"design outputs of {family.name}")
         case _:
-            # Means, counts, dwells, own outputs; passages of wrapped angles, and passages over an interval, are
-            # searched anew for every design.
+            # Means, counts, dwells, own outputs; passages of wrapped angles, and places over an interval, are searched
+            # anew for every design.
             return Measure(name, "scalar", (), numbers=(name,))
 
 

@@ -76,6 +76,24 @@ def test_slopes_of_the_angle_in_a_window_are_exact(
         assert rows.loc[name, "growing"] == pytest.approx(slope, rel=1e-6, abs=1e-8), name
 
 
+@pytest.mark.parametrize(
+    ("name", "table", "outputs"),
+    [
+        ("rssr", ROCKER, ["psi_ext", "psi_fold", "max_psi", "min_psi"]),
+        ("backrest", dict(family("backrest").example), ["rho_max_h", "rho_min_K", "rho_max_L1", "max_K"]),
+    ],
+)
+def test_ends_beyond_half_a_turn_and_places_over_an_interval_are_those_of_summaries(
+    name: str, table: dict[str, float], outputs: list[str]
+) -> None:
+    full = family(name)
+    design = np.array([table.get(p.name, p.default) for p in full.parameters], np.float64)
+    true = sweep.summarise(full, table, outputs, accuracy=1e-10)
+    rows = pd.DataFrame(sensitivities(full, design, outputs)).groupby("output")["value"].first()
+    for output in outputs:
+        assert rows[output] == pytest.approx(float(true[output][0]), rel=1e-9), output
+
+
 def test_a_dip_narrower_than_the_samples_is_no_feasible_rest() -> None:
     # Its two edges, 0.0016 rad apart around one of 256 samples, once merged into one: the rest of 1.39 rad was 1.76.
     links = {"a1": 5.00476917879443, "b1": 38.29477135152248, "c1": 15.597207723578443, "a2": 47.68539618599832}

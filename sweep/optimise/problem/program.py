@@ -224,7 +224,9 @@ class _Layout:
         ext, fold = (highest, lowest) if sign > 0.0 else (lowest, highest)
         count, limit_points = len(self.points), {"ext": ext, "fold": fold}
         if m.kind in ("ext", "fold"):
-            return [({limit_points[m.kind]: 1.0}, 0.0)]
+            end = limit_points[m.kind]
+            turns = math.ceil((float(self.points.value[end]) - math.pi) / math.tau) if m.series[0].wrapped else 0
+            return [({end: 1.0}, -math.tau * turns)]
         if m.kind in ("phi_ext", "phi_fold"):
             end = limit_points[m.kind.removeprefix("phi_")]
             return [({count + end: 1.0}, self._turn_shift(end))]
