@@ -48,7 +48,7 @@ sample = { kind = "sobol", n = 30000, seed = 57 }
 e = "100 mm"
 f = { from = -60, to = 60, unit = "mm" }
 g = "0 mm"
-alpha = "90 deg"
+alpha = "89.999999999 deg"
 [limits]
 rotatable = true
 a = { min = 3, unit = "mm" }
