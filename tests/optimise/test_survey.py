@@ -52,7 +52,7 @@ def test_of_a_population_the_best_end_counts_alone() -> None:
     assert (found.basins, found.best, found.starts) == (1, 3, 7) and found.unseen == pytest.approx(2 / 6)
     assert found.populations == 3 and not found.enough
     chance = "another population finds a new one with an estimated chance of 33 %"
-    assert found.words == f"1 local optimum found, the best by 3 of 3 populations; {chance}"
+    assert found.words == f"3 populations ended best in 1 local optimum, 3 of them in the best one; {chance}"
     assert found.warnings[-1] == f"{chance}, not the 2 % wanted: more populations may find a better one"
     assert survey(bowl(), groups, ends, POPULATIONS, "starts").enough
     twice = survey(bowl(), groups, ends[:5], POPULATIONS, "starts")

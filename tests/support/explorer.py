@@ -31,7 +31,8 @@ def explored(source: str | Path) -> Iterator[str]:
     finally:
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=30)
-    assert process.returncode == 0 and said == "", said
+    # with kernels that no test has compiled before, the page tells its progress
+    assert process.returncode == 0 and all(line.startswith("compiling") for line in said.splitlines()), said
 
 
 def asked(address: str, what: str, content: object, **headers: str) -> Any:

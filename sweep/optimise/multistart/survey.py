@@ -95,9 +95,11 @@ class Survey:
         """Summary: local optima found, starts that ended in the best, chance that another start finds a new one."""
         if self.basins == 0:
             return "none led to a design within all limits"
-        by = f"by {self.best} of {how_many(self.populations, 'population')}"
-        best = by if self.populations else f"from {how_many(self.best, 'distinct start')}"
-        return f"{optima_words(self.basins)} found, the best {best}; {self._chance}"
+        optima = optima_words(self.basins)
+        if self.populations:
+            populations = how_many(self.populations, "population")
+            return f"{populations} ended best in {optima}, {self.best} of them in the best one; {self._chance}"
+        return f"{optima} found, the best from {how_many(self.best, 'distinct start')}; {self._chance}"
 
     @property
     def _chance(self) -> str:
