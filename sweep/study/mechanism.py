@@ -187,9 +187,8 @@ def read_mechanism(
         return None if family is None else (names, family)
     if "mechanism" in file:
         faults.value(("mechanism",), data["mechanism"], "either [mechanism] or [machine.NAME], not both")
-        return None  # which of them the other tables describe is not known
-    if isinstance(data["machine"], dict) and _misspelt_members(data, faults):
-        return None  # each of its entries would be a fault too
+    if isinstance(data["machine"], dict) and ("mechanism" in file or _misspelt_members(data, faults)):
+        return None  # entries of the other tables would be faults too: what they describe is not known
     for table in ("locus", "fit"):
         if table in file:
             faults.value((table,), data[table], "nothing here: it finishes the links of a [mechanism] alone")
