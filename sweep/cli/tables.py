@@ -149,15 +149,21 @@ def refuse_degrees(domain: Domain, phi: float) -> None:
 
 
 def wanted(texts: tuple[str, ...]) -> list[str]:
-    """Return the names in ``--want x,y --want z``, without repetition."""
-    names = [name.strip() for text in texts for name in text.split(",")]
-    return list(dict.fromkeys(name for name in names if name))
+    """Return the names in ``--want x,y --want z``, without repetition; there has to be one."""
+    if not (names := _names(texts)):
+        raise MissingInput("--want", "the name of an output; `sweep families FAMILY` lists them", "command line")
+    return names
 
 
 def kept(texts: tuple[str, ...]) -> bool | list[str]:
     """Return the argument ``keep`` of the API for ``--keep``."""
-    names = wanted(texts)
+    names = _names(texts)
     return True if names == ["all"] else names
+
+
+def _names(texts: tuple[str, ...]) -> list[str]:
+    names = [name.strip() for text in texts for name in text.split(",")]
+    return list(dict.fromkeys(name for name in names if name))
 
 
 def checked_format(out: Path | None, table: Path | None = None) -> Path | None:

@@ -222,10 +222,12 @@ def _compile(study: Study, jobs: int, phases: Phases) -> None:
         with install_listener("numba:compile", compiled):
             step(k)
         if compiled.functions and min(jobs, os.cpu_count() or 1) > 1 and count - k - 1 > few:
+            others = f"steps, the others in {how_many(jobs, 'process', 'es')}"
+            phases.say("compiling", k + 1, count, others)
             with stop_on_signal() as stop:
                 ready = executor("loky", jobs).outcomes(step, reversed(range(k + 1, count)), jobs, stop)
                 for done, _ in enumerate(ready, k + 2):
-                    phases.say("compiling", done, count, f"steps, the others in {how_many(jobs, 'process', 'es')}")
+                    phases.say("compiling", done, count, others)
             stop.raise_if_signalled("compiling", "what is compiled is")
             jobs = 1  # all later steps are loaded
     phases.say("compiling", count, count)

@@ -124,6 +124,7 @@ def test_summarise_passes_accuracy_and_window(tmp_path: Path) -> None:
     [
         (("geared_dwel", "{table}", "--want", "psi"), "did you mean 'geared_dwell'?"),
         (("geared_dwell", "{table}", "--want", "d2psy"), "want = 'd2psy'"),
+        (("geared_dwell", "{table}", "--want", " ,"), "--want is missing; needed: the name of an output"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/x.xlsx"), "ending in .parquet or .csv"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/none/x.csv"), "a file in a folder that exists"),
         (("geared_dwell", "{table}", "--want", "psi", "--out", "{tmp}/../{name}/good.csv"), "this one is TABLE"),
